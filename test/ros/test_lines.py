@@ -278,6 +278,7 @@ def plant(tmp_path: Path, end_request: EndRequest,
         monkeypatch.setattr(module, 'BridgeNode', plant.make_node)
         yield plant
         plant.end()
+        assert not [thread for thread in threading.enumerate() if thread.name == 'callbacks']
         assert not get_default_context().ok()
 
 
@@ -296,7 +297,6 @@ def test_each_line_is_a_node_of_its_own(plant: Plant) -> None:
     assert line_status(plant, OK)['running'] == '3'
     assert plant.observer.call(Trigger, '/hall/a/reload', Trigger.Request()).success
     assert plant.end() == 0
-    assert not [thread for thread in threading.enumerate() if thread.name == 'callbacks']
 
 
 def test_process_has_a_name_of_its_own(plant: Plant) -> None:

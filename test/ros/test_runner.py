@@ -116,6 +116,22 @@ def test_each_line_is_checked_ten_times_a_second_and_looks_come_as_often(
         assert [later - time for time, later in pairwise(times[:10])] == pytest.approx([0.1] * 9)
 
 
+def test_failed_link_ends_all_by_the_clock_but_no_node_that_a_callback_uses(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    calls: list[object] = []
+    nodes: Any = [Mock(has_failed=failed) for failed in (True, False)]
+    callbacks = [Mock(**{'is_alive.return_value': is_used}) for is_used in (True, False)]
+    monkeypatch.setattr('abdf1_ros.ros.process.runner.Callbacks', Mock(side_effect=callbacks))
+    monkeypatch.setattr('abdf1_ros.ros.process.runner.end_together', calls.append)
+    ended: Any = Mock(**{'wait.return_value': False, 'set.side_effect': lambda: calls.append('')})
+    runner = Runner([*map(Line, nodes)])
+    assert runner.run(ended) == 1
+    runner.destroy()
+    assert calls == ['', nodes]
+    assert [each.end.call_count for each in callbacks] == [1, 1]
+    assert [node.destroy_node.called for node in nodes] == [False, True]
+
+
 @pytest.mark.parametrize(('passed', 'words'), [(7.9, 3), (8.0, 0)])
 def test_all_plcs_are_told_before_a_link_stops_and_results_come_before_the_last_words(
         passed: float, words: int, monkeypatch: pytest.MonkeyPatch) -> None:
