@@ -190,8 +190,7 @@ def end(cell: Cell, seconds: float = 2.0) -> None:
     while not driver.interlocks.is_over:
         assert cell.now < give_up
         cell.run(0.005)
-    own = driver.interlocks
-    assert not any(row.is_under_way for row in (*own.heartbeats, *own.fallbacks))
+    assert not any(row.is_under_way for plc in driver.interlocks.plcs.values() for row in plc.rows)
     cell.bench.lose_port()
     cell.run(2.0)
 
