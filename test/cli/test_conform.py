@@ -154,8 +154,8 @@ def test_program_that_reads_is_answered_as_a_plc_answers(
 
     def ask() -> None:
         while not over.wait(0.02):
-            with suppress(Abdf1Error), Client(link, plc_type='SLC', station=2,
-                                              duplex=duplex) as plc:
+            with suppress(Abdf1Error, OSError), Client(link, plc_type='SLC', station=2,
+                                                       duplex=duplex) as plc:
                 while not over.is_set():
                     read.append(plc.read('N7:0'))
 
