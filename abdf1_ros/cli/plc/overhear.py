@@ -25,7 +25,6 @@ from abdf1_ros.cli.overhearing import Overhearing
 from abdf1_ros.cli.plc.session import opened
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Poll
-from abdf1_ros.df1.listen import SecondPort
 from abdf1_ros.df1.listener import LineKind, ListeningDecoder
 from abdf1_ros.driver.overheard import Carried
 from abdf1_ros.errors import PortLost
@@ -92,8 +91,7 @@ def heard_reads(network: Network, seconds: float) -> list[Carried]:
     """
     overhearing = Overhearing(network)
     for at, data in _bytes_of(network, seconds):
-        direction = Direction.IN if isinstance(data, SecondPort) else Direction.UNKNOWN
-        overhearing.hear(Chunk(at, direction, data))
+        overhearing.hear(Chunk(at, Direction.UNKNOWN, data))  # a second port gives SecondPort
     return overhearing.carried
 
 

@@ -128,6 +128,7 @@ def test_scan_of_nobody_has_status_1(plc: Plc) -> None:
     said = plc('scan', '8,9', *FAST)
     assert (said.status, said.lines) == (
         1, ['0 of 2 stations answer; silent stations were asked 2 times'])
+    assert 'sent: ' not in said.err  # nothing was lost on this line
 
 
 def test_watch_prints_changes_and_ends_by_count(plc: Plc) -> None:

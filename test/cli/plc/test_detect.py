@@ -148,9 +148,11 @@ class Other(FullDuplexPeer):
 def test_full_duplex_port_with_station_0_is_found_and_named(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with plc_on(tmp_path / 'line', 'CRC', Duplex.FULL, Other) as network:
-        assert main(['detect', '--port', network.port, '--baud', '9600', '--duplex', 'full',
-                     '--check', 'CRC', '--timeout', '100']) == 0
-    assert '--peer --station 0 --port' in capsys.readouterr().out
+        for verb in (['detect'], ['init', '--into', str(tmp_path / 'new')]):
+            assert main([*verb, '--port', network.port, '--baud', '9600', '--duplex', 'full',
+                         '--check', 'CRC', '--timeout', '100']) == 0
+    said = capsys.readouterr().out
+    assert '--peer --station 0 --port' in said and 'watch S:0 --station 0 --net' in said
 
 
 def test_radio_modem_is_found_by_replies_without_ack(

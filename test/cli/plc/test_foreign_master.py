@@ -31,6 +31,7 @@ from abdf1_ros.cli.plc.command import main
 from abdf1_ros.cli.plc.verbs import init
 from abdf1_ros.cli.terminal import called
 from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.listen import SecondPort
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver import requests
 from abdf1_ros.driver.overheard import Carried
@@ -212,6 +213,19 @@ def test_files_of_a_line_that_is_heard_have_its_speed_and_its_check_if_that_is_k
         f'next: {called("check")} {net} {rows}']
     assert Path(net).read_text('utf-8').splitlines()[1] == f'Listen,{right},/dev/x,,1200,Even'
     assert [(line.mode, line.baud, line.error_code) for line in heard] == [('Listen', 1200, right)]
+
+
+def test_reads_of_a_full_duplex_line_are_heard_on_two_ports(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    ask, answer = (frame(bytes.fromhex(text)) for text in (
+        '01 00 0F 00 07 00 A2 04 07 89 00 00', '00 01 4F 00 07 00 2A 00 2B 00'))
+    # The next command begins while the reply comes.
+    heard = [ask, SecondPort(b'\x10\x06' + answer[:6]), b'\x10\x02\x01', SecondPort(answer[6:])]
+    monkeypatch.setattr(overhear, 'opened', lambda network: lambda: SimpleNamespace(
+        read=lambda wait, wake: heard.pop(0) if heard else b'', close=lambda: None))
+    network = Network(mode='Listen', com_port='/dev/a', listen_port='/dev/b')
+    assert [read.text for read in overhear.heard_reads(network, 0.05)] == [
+        'protected typed logical read N7:0, 2 words']
 
 
 @for_all(('cmd', 'data', 'times', 'row'), [
