@@ -63,8 +63,9 @@ def port(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 def test_init_writes_files_that_the_node_takes(port: str, tmp_path: Path, capsys: Output) -> None:
     assert main(['init', '--port', port, '--into', str(tmp_path), '--baud', '19200',
                  '--stations', '1,2', *PATIENT]) == 0
-    said = capsys.readouterr().out
-    assert 'station 1: PLC-5/40' in said and 'station 2: SLC 5/03' in said
+    assert capsys.readouterr().out.splitlines()[:3] == [
+        '19200 baud, half duplex, CRC', 'station 1: PLC-5/40 series A revision A, REM RUN',
+        'station 2: SLC 5/03 series A revision 1, REM RUN']
     network = load_network(str(tmp_path / 'net.csv'))
     assert (network.port, network.baud, network.mode, network.error_code, network.station) == (
         port, 19200, 'Master', 'CRC', Network().station)

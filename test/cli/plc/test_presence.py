@@ -47,6 +47,8 @@ def test_everything_a_station_has_said() -> None:
         'station 2: SLC 5/03 series B revision 3, REM PROG', '  mode       REM PROG',
         '  faults     major error 0x0021', '  remarks    forces active', '  own name   CELL_3',
         '  program ID 0x1A2B', '  memory     16 K', '  reply      after 31 ms']
+    assert describe(Presence(2, 0.0, Identity(None, 'type 7'), None, True, True)) == [
+        'station 2: type 7', '  faults     none', '  reply      after 0 ms']
 
 
 def test_station_that_does_not_say_what_it_is() -> None:
