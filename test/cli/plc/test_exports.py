@@ -172,7 +172,8 @@ def test_all_five_descriptions_of_rslogix_are_kept(tmp_path: Path) -> None:
     assert imported(tmp_path, row)[0][0].description == 'one two three four five'
 
 
-def test_what_is_not_about_an_address_is_counted(tmp_path: Path) -> None:
+def test_what_is_not_about_an_address_is_counted(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     rows = RSLOGIX + ('"DFILE:N7","","","Numbers"\n"S:1/15","Global","","First Pass"\n'
                       '"S:4","Global","CLOCK","Free running clock"\n')
     mappings, left_out = imported(tmp_path, rows)
@@ -180,8 +181,9 @@ def test_what_is_not_about_an_address_is_counted(tmp_path: Path) -> None:
     source = str(tmp_path / 'export.csv')
     assert (left_out, import_map(source, STATION_2).ignored) == ([], {
         'DFILE rows': 1, 'rows of the status file without a symbol (--status takes them)': 1})
-    with_status = import_map(source, Wanted(has_status=True))
-    assert (with_status.count, with_status.left_out) == (6, [])
+    assert main(['import', source, '--into', str(tmp_path / 'new'), '--status']) == 0
+    assert capsys.readouterr().out.splitlines()[:2] == [
+        'ignored: 1 DFILE rows', f'written: {tmp_path}/new/map.csv: 6 rows']
 
 
 def test_octal_addresses_are_for_a_plc5(tmp_path: Path) -> None:
@@ -446,6 +448,10 @@ def test_rows_of_several_plcs_are_not_mixed(tmp_path: Path) -> None:
     assert (mapping.tag, left_out) == ('Other', [])
     ignored = import_map(str(tmp_path / 'export.csv'), Wanted(node='PLC2')).ignored
     assert ignored['rows of other PLCs'] == 3
+    assert main(['import', str(tmp_path / 'export.csv'), '--into', str(tmp_path / 'new'), '--plc',
+                 'PLC2', '--read-only', '--period', '900', '--station', '2-3']) == 0
+    assert (tmp_path / 'new' / 'map.csv').read_text('utf-8').splitlines()[1:] == [
+        f'station_{number}/Other,Read,N7:0,{number},SLC,,,900,,,,,' for number in (2, 3)]
     for node in ('X', ''):
         with pytest.raises(ConfigurationError, match=f'has no PLC "{node}"; it has PLC1, PLC2'):
             imported(tmp_path, text, Wanted(node=node))
