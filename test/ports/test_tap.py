@@ -47,8 +47,9 @@ def hear(listening: Tap, count: int) -> list[Chunk]:
 def test_one_port_is_listened_to(ptys: list[Pty]) -> None:
     with Tap([str(ptys[0].name)], PortSettings('', 1200)) as listening:
         assert termios.tcgetattr(ptys[0].fileno())[4] == termios.B1200
-        ptys[0].write(b'\x10\x04')
-        assert hear(listening, 2) == [Chunk(None, Direction.UNKNOWN, b'\x10\x04')]
+        for said in (b'\x10\x04', b'\x10\x06'):
+            ptys[0].write(said)
+            assert hear(listening, 2) == [Chunk(None, Direction.UNKNOWN, said)]
     open_port(PortSettings(str(ptys[0].name))).close()  # it is free again
 
 

@@ -165,6 +165,7 @@ def test_opener_records_across_openings(tmp_path: Path, monkeypatch: pytest.Monk
         with pytest.raises(OSError):
             port.write(b'this has not left')
     opener.close()
+    assert 'trace' not in {thread.name for thread in threading.enumerate()}
     settings: dict[str, str] = {}
     assert [chunk.data for chunk in chunks_of(tmp_path / 'x', settings)] == [b'\x01', b'\x02']
     assert (settings['baud'], settings['check'], settings['duplex'], settings['port']) == (
