@@ -296,12 +296,12 @@ class LiveValues:
             cells += [(name, *[''] * len(head), text, '') for name, text in more]
         lines = _with_descriptions(('address', *titles, value), cells, width - taken)
         above, below = [*self._modes()], self.faults_of_line()
-        left = height - 1 - len(above) - len(below)
+        left = max(height - 1 - len(above) - len(below), 1)
         if len(lines) > left:
             hidden = len(lines) - (left - 1)
             lines = [*lines[:left - 1], f'+{hidden} more; a higher window shows them']
         lines = [*above, *lines, *below]
-        picture = [cut(line, width - 1) for line in lines]
+        picture = [cut(line, width - 1) for line in lines[:max(height - 1, 1)]]
         # After a change of the window's size the old lines have moved.
         start = '' if self._size is None else \
             f'\x1b[{self._height}A' if size == self._size else '\x1b[H'

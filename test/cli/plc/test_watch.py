@@ -264,6 +264,7 @@ def test_table_marks_changes_and_says_what_does_not_fit(draw: Draw) -> None:
                      'N7:9           1  int16            5', 'N7:0           1  int16']
     assert draw(words, *news, size=(52, 5))[1:] == [
         *lines[:2], '+2 more; a higher window shows them']
+    assert draw(words, *news, size=(52, 1)) == ['+5 more; a higher window shows them']
 
 
 def test_table_has_tags_beside_addresses(draw: Draw) -> None:
@@ -336,6 +337,7 @@ def test_mode_of_each_plc_and_faults_of_the_line_stand_around_the_values(
     lines = draw([SPEED, NAME], (SPEED, array('h', [5])), (NAME, 'Tank'))
     assert lines[0] == f'station 1: PLC-5/40, {text}'
     assert lines[1].startswith('address') and len(lines) == 4
+    assert draw([SPEED, NAME], size=(100, 2)) == lines[:1]
     monkeypatch.setattr(LiveValues, 'faults_of_line', lambda self: ['line: 3 repeated, 1 damaged'])
     assert draw([SPEED], (SPEED, array('h', [5])))[-1] == 'line: 3 repeated, 1 damaged'
 
