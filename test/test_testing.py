@@ -134,6 +134,7 @@ def test_log_of_a_bridge_has_all_starts_and_its_end_is_shown(
     monkeypatch.setattr(Bridge, 'start', START)
     monkeypatch.setattr(subprocess, 'Popen', Told)
     bridge = Bridge([], tmp_path / 'log')
+    assert bridge.last_words() == ''
     bridge.start()
     bridge.start()
     assert bridge.last_words().splitlines()[1:] == [
