@@ -201,8 +201,6 @@ class Wire:
         elif symbol.kind is SymbolKind.ENQ and symbol.at > self._message_at:
             self.enquired_after = min(self.enquired_after, symbol.at - self._message_at)
         self._embedded.extend(Symbol(kind, b'', at=symbol.at) for kind in symbol.embedded)
-        if not self._embedded:
-            return symbol
         self._embedded.append(symbol)
         return self._embedded.popleft()
 

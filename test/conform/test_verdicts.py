@@ -18,7 +18,7 @@ from abdf1_ros.conform import codec
 from abdf1_ros.conform.case import CaseResult, Target, Verdict
 from abdf1_ros.conform.cases import CASES
 from abdf1_ros.conform.codec import BlockCheck, Symbol, SymbolKind
-from abdf1_ros.conform.ends import AskingEnd, MasterEnd, PeerEnd, SlaveEnd
+from abdf1_ros.conform.ends import AskingEnd, MasterEnd, PeerEnd, SlaveEnd, Words
 from abdf1_ros.conform.wire import Failed, Wire
 import pytest
 from support.cases import for_all
@@ -261,6 +261,9 @@ def test_plc5_that_refuses_an_area_fails_address_forms() -> None:
     line = MutatedPeer('CRC', Habit.REFUSES_AREA, family='PLC5')
     assert failures(results_of(line, Target.PEER, 'CRC', 'PLC5')) == [
         'address-forms: expected STS 00 for the address 07 00 07 02, got STS 10']
+    result, = results_of(line, Target.PEER, 'CRC', only='address-forms',
+                         words=Words(7, 300, 1, 'PLC5'))  # has no short form
+    assert result.expected == 'STS 00 for the address 06 ff 07 00 ff 2c 01'
 
 
 class Babble:
@@ -342,6 +345,8 @@ def test_wait_for_a_symbol_ends_though_others_come_for_ever() -> None:
     with pytest.raises(Failed, match='got bytes outside of any'):
         wire.expect(SymbolKind.ACK)
     assert wire.noise > 0
+    line.data = b''
+    assert wire.hear(0.1) is None and wire.has_heard
 
 
 def test_numbers_of_commands_begin_again_after_the_last() -> None:
@@ -379,6 +384,41 @@ def test_damaged_reply_that_a_case_has_left_is_not_the_fault_of_the_next_case() 
     line.data = b''
     end.settle()
     assert end.further(0.1) is None
+
+
+def test_reply_that_overtakes_its_ack_is_the_reply() -> None:
+    line = Babble()
+    end = PeerEnd(Wire(line, BlockCheck.CRC, line.clock, is_half_duplex=False), 1, 0, 0)
+    command = end.command()
+    reply = bytes((command[1], command[0], 0x46, 0)) + command[4:]
+    line.data = end.frame(reply) + codec.ACK
+    assert (end.offer(command), line.sent) == (Symbol(
+        SymbolKind.ACK, codec.ACK, at=line.now), end.frame(command))
+    line.data = b''
+    assert end.collect() == reply
+    assert line.sent == end.frame(command) + codec.ACK
+
+
+def test_enquiry_gets_the_last_response() -> None:
+    line = Babble(codec.ENQ)
+    wire = Wire(line, BlockCheck.CRC, line.clock, is_half_duplex=False)
+    assert wire.hear(0.1) is None
+    wire.send(codec.ACK)
+    assert wire.hear(0.1) is None
+    line.data = codec.message(bytes(6), BlockCheck.CRC)  # has no response yet
+    assert wire.hear(0.1) is not None
+    line.data = codec.ENQ
+    assert wire.hear(0.1) is None
+    assert line.sent == codec.NAK + 2 * codec.ACK + codec.NAK
+
+
+def test_silence_counts_from_the_last_byte_that_was_sent() -> None:
+    line = Babble()
+    wire = Wire(line, BlockCheck.CRC, line.clock, is_half_duplex=False, char_time=0.01)
+    for size in (100, 50):
+        wire.send(bytes(size))
+    assert wire.hear(0.5) is None
+    assert line.now == pytest.approx(2.0)
 
 
 # M 5-4 and 5-5: DST 08 ... with a byte 10, which is doubled; to station 20 (hex) as a master.
@@ -443,8 +483,9 @@ def test_frame_is_divided_and_damaged_where_a_case_says() -> None:
         begun, rest = codec.divided(frame)
         assert codec.next_symbol(begun + codec.ACK + rest, BlockCheck.CRC, False) == Symbol(
             SymbolKind.MESSAGE, begun + codec.ACK + rest, data, embedded=(SymbolKind.ACK,))
-        assert [[at - len(frame) for at, byte in enumerate(other) if byte != frame[at]]
-                for other in codec.all_damaged(frame, BlockCheck.CRC)] == [[-2], [-1]]
+        assert [[at - len(frame) for at, (byte, right) in enumerate(
+            zip(other, frame, strict=True)) if byte != right]
+            for other in codec.all_damaged(frame, BlockCheck.CRC)] == [[-2], [-1]]
 
 
 def test_symbol_is_shown_in_words() -> None:

@@ -50,12 +50,12 @@ class TimedLine(RawLine, Protocol):
 
 
 def results_of(line: TimedLine, target: Target, check: str, family: str = 'SLC',
-               only: str = '', station: int = 1) -> list[CaseResult]:
+               only: str = '', station: int = 1, words: Words | None = None) -> list[CaseResult]:
     """Return how the cases of ``target`` end."""
     wire = Wire(line, BlockCheck(check), line.clock, is_half_duplex=target.is_half_duplex,
                 is_radio=target.is_radio, answer_time=1.0,
                 passes_commands=target in (Target.SLAVE, Target.PEER, Target.RADIO))
-    words = Words(7, 2, 3, family)
+    words = words or Words(7, 2, 3, family)
     plc = simulated_plc(1, 'PLC5', line.clock, ('N7:0', 20), checksum=check)
 
     def serve(command: bytes) -> bytes:
