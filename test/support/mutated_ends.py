@@ -62,6 +62,7 @@ Habit = Enum('Habit', [
     'ALWAYS_STS',  # 10
     'WORDS_REVERSED', 'WRITES_FIRST_WORD_ONLY', 'READS_NEXT_WORD',
     'BYTES_EXCHANGED',  # of words that are written
+    'REPEATS_CUT',  # a message without its last byte
     'BIT_15_LOST', 'MASK_SETS_ONLY', 'MASK_CHANGES_NEXT_WORD',
     'MASK_EXCHANGED',  # with the bits
     'SENDS_COMMANDS',  # of its own, as MSG does: 0.7 s after the last
@@ -499,6 +500,8 @@ class MutatedSlave(Wire):
             self._sent += 1
             self._has_just_sent = True
             self.say(self.frame(self._held))
+            if self.has(Habit.REPEATS_CUT):
+                self._held = self._held[:-1]
             if self._queue and self.has(Habit.TWO_REPLIES_TO_A_POLL):
                 self.say(self.frame(self._queue.popleft()[1]))
         elif not self.has(Habit.NO_EOT):
@@ -560,6 +563,8 @@ class _FullDuplex(Wire):
                     self.has(Habit.NO_REPETITION):
                 self._end(is_taken=False)
             else:
+                if self.has(Habit.REPEATS_CUT):
+                    self._outgoing[0] = self._outgoing[0][:-1]
                 self._transmit()
 
     def _received(self, data: bytes, is_good: bool) -> None:
