@@ -271,8 +271,12 @@ def traced(path: str, port: PortSettings, check: str, duplex: Duplex, open_it: C
            on_error: Callable[[str], None]) -> tuple[Callable[[], Port], Trace]:
     """Begin a trace; return it after a function that opens the port and records its bytes."""
     from abdf1_ros.ports.trace import begun_now, Trace, TracedPort
-    trace = Trace(path, {'begun': begun_now(), 'port': port.name, 'baud': str(port.baud),
-                         'check': check, 'duplex': duplex.name.lower()}, on_error)
+    try:
+        trace = Trace(path, {'begun': begun_now(), 'port': port.name, 'baud': str(port.baud),
+                             'check': check, 'duplex': duplex.name.lower()}, on_error)
+    except OSError:
+        open_it().close()  # it was open already
+        raise
     begun = time.monotonic()
     return lambda: TracedPort(open_it(), trace, begun), trace
 
