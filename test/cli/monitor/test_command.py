@@ -29,7 +29,7 @@ from typing import Any
 from unittest.mock import MagicMock, Mock
 
 from abdf1_ros.cli.monitor.command import main, Screen
-from abdf1_ros.cli.monitor.view import TextLine
+from abdf1_ros.cli.monitor.view import Style, TextLine
 import pytest
 from std_msgs.msg import UInt16MultiArray
 from support.commands import call, Output
@@ -286,6 +286,24 @@ def test_keys_move_the_picture(monkeypatch: pytest.MonkeyPatch) -> None:
     assert screen.wants_end()
     screen.show(picture[:3])
     assert window.drawn[23][0].startswith('1-3 of 3  ')
+
+
+def test_lines_have_the_colours_of_their_styles(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv('NO_COLOR', raising=False)
+    for name in ('has_colors', 'use_default_colors', 'init_pair'):
+        monkeypatch.setattr(f'curses.{name}', pairs := Mock())
+    monkeypatch.setattr('curses.color_pair', lambda number: number << 8)
+    looks, window = [], Window()
+    for _ in range(2):
+        screen = Screen(window)  # type: ignore[arg-type]
+        screen.show([TextLine(style.value, style) for style in Style])
+        looks.append([window.drawn[row][1] for row in range(len(Style))])
+        monkeypatch.setenv('NO_COLOR', '')
+    green, yellow, red = 2, 3, 1
+    assert looks == [[0, curses.A_BOLD, green << 8, yellow << 8, red << 8],
+                     [0, curses.A_BOLD, 0, 0, 0]]
+    assert [call.args for call in pairs.call_args_list] == [
+        (number, number, -1) for number in (green, yellow, red)]
 
 
 def test_mark_stays_at_its_line_where_others_come(monkeypatch: pytest.MonkeyPatch) -> None:
