@@ -102,6 +102,9 @@ def test_values_come_with_address_and_promise(bridge: Bridge, watch: NodeWatch) 
     assert (list(speeds.values or ()), speeds.address, speeds.promised) == (
         [1200, -800], 'N7:0', PROMISE)
     assert speeds.state(time.monotonic()) == ('fresh', Style.GOOD)
+    bridge.read(make_mapping('N7:2', tag='found_later'), [1])
+    readings = heard(until(watch, lambda picture: len(heard(picture)) == 2))
+    assert readings['speeds'].curve is speeds.curve  # its subscription stays
 
 
 def test_strings_and_topics_under_other_names_are_heard(bridge: Bridge, watch: NodeWatch) -> None:
