@@ -62,10 +62,13 @@ def test_no_line_at_all() -> None:
     assert texts() == ['no line is heard; diagnostics come every second', 'line state load cycle']
 
 
-@pytest.mark.parametrize('width', [20, 40, 80])
-def test_lines_are_no_longer_than_the_terminal_is_wide(width: int) -> None:
+@pytest.mark.parametrize(('width', 'name'), [
+    (20, '/a_...'), (40, '/a_hall_of...'), (80, '/a_hall_of_some_size/an...'),
+    (120, '/a_hall_of_some_size/and_a_pres...')])
+def test_lines_are_no_longer_than_the_terminal_is_wide(width: int, name: str) -> None:
     found = render_plant([line('/a_hall_of_some_size/and_a_press_of_a_name', SILENT)], NOW, width)
     assert max(len(shown.text) for shown in found) <= width
+    assert found[-1].text.startswith(f'  {name}  ')
     assert found[-1].section == '/a_hall_of_some_size/and_a_press_of_a_name'
 
 
