@@ -220,6 +220,7 @@ def test_warnings_come_first_and_long_tables_are_folded(
     folded = lines.index('... and 51 more; --json has them all')
     assert lines[folded - 1].startswith('t39 ') and len(lines) < 70
     assert 'more; ' not in check(GOOD_NET, rows[:40])
+    assert '... and 1 more; ' in check(GOOD_NET, rows[:41])
     monkeypatch.setattr(sys.stdout, 'isatty', lambda: True)
     monkeypatch.setenv('COLUMNS', '40')
     assert max(len(line) for line in check(GOOD_NET, rows).splitlines() if line[0:1] == 't') == 40
@@ -295,7 +296,8 @@ def plant(folder: Path, **lines: tuple[str, str]) -> None:
 def test_folder_has_a_line_of_text_for_each_pair(tmp_path: Path, capsys: Output) -> None:
     plant(tmp_path, press=(GOOD_NET, GOOD_ROW), glue=(GOOD_NET, GOOD_ROW))
     (tmp_path / 'hall' / 'paint').mkdir(parents=True)
-    write_csv(tmp_path / 'hall' / 'paint' / 'net.csv', NET_HEADER, [GOOD_NET])
+    write_csv(tmp_path / 'hall' / 'paint' / 'net.csv', NET_HEADER,
+              [GOOD_NET.replace('Master', 'Slave')])
     write_csv(tmp_path / 'hall' / 'paint' / 'map.csv', MAP_HEADER, [GOOD_ROW])
     write_csv(tmp_path / 'notes.csv', 'a', ['b'])
     assert main([str(tmp_path)]) == 0
@@ -304,6 +306,7 @@ def test_folder_has_a_line_of_text_for_each_pair(tmp_path: Path, capsys: Output)
     assert lines[-1] == \
         '3 lines: 3 good (0 of them with warnings), 0 with errors; not part of a line: notes.csv'
     assert lines[0].startswith('glue: 1 row, port /dev/ttyS0, poll cycle ')
+    assert lines[1] == 'hall/paint: 1 row, port /dev/ttyS0, load 7%'
 
 
 def test_lines_stand_in_the_order_of_their_numbers(tmp_path: Path, capsys: Output) -> None:
@@ -408,7 +411,7 @@ def test_rows_that_a_recording_fills_are_told(tmp_path: Path, capsys: Output) ->
     assert content['rows']['unread'] == 'no other node reads it'
     assert any('word range read N7:7, 3 words' in text for text in content['reads'])
     assert main([str(net), str(rows), '--heard', str(tmp_path / 'none.cap')]) == 2
-    assert 'No such file' in capsys.readouterr().out
+    assert f'error: {tmp_path}/none.cap: No such file' in capsys.readouterr().out
     assert main([str(rows), str(rows), '--heard', str(heard)]) == 2  # without a net file
     net.write_text('Com_Port,Error_Code\n/dev/ttyS0,BCC\n', encoding='utf-8')
     assert main([str(net), str(rows), '--heard', str(heard)]) == 0
