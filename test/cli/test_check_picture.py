@@ -15,7 +15,6 @@
 """The picture of a plan: what is drawn, in a real browser too, and what cannot get into it."""
 
 from pathlib import Path
-import re
 
 from abdf1_ros.cli.check import main
 from abdf1_ros.cli.lanes import Bar, drawing, Lane, Look, NAMES
@@ -61,14 +60,35 @@ def test_each_station_has_a_lane_and_each_read_a_bar_as_long_as_it_takes(
     assert float(asked[1]['x']) == pytest.approx(
         float(waited[0]['x']) + float(waited[0]['width']), abs=0.2)
     assert found.bars('bad') == found.bars('small') == 0
-    shares = [float(share[1]) for text in found.texts
-              if (share := re.search(r'; ([\d.]+)% of the time; ', text))]
-    assert shares[-len(ROWS):] == sorted(shares[-len(ROWS):], reverse=True)
+    assert not any(text.startswith('Reads with Period 0') for text in found.texts)
     assert ('p', {'class': 'verdict is-good'}) in found.found
     for begin in ('every Period can be kept; load', 'expected poll cycle: '):
         assert any(text.startswith(begin) for text in found.texts)
     (told,) = {text for text in found.texts if text.startswith('station 1, F8:0 to F8:2: ')}
     assert told.endswith(' of the time; level')
+
+
+def test_shares_of_the_line_and_the_table_tell_all_reads(tmp_path: Path, capsys: Output) -> None:
+    _, page = drawn(tmp_path, capsys, (
+        'speed,Read,N7:0,1,PLC5,2,1000,', 'free,Read,N7:0,4,SLC,,0,',
+        'alive,Heartbeat,N10:0,1,PLC5,,,'))
+    found = elements(page)
+    at = found.texts.index('What the Periods need of the time there is')
+    told = [text for text in found.texts[at:] if text.strip()]
+    heads = told.index('Reads')
+    assert told[told.index('%') + 1:heads] == [
+        'station 1, N10:0: 1 word in 72.1 ms; Period 500 ms; 14.4% of the time; alive', '1: N10:0',
+        'station 1, N7:0 to N7:1: 2 words in 74.2 ms; Period 1000 ms; 7.4% of the time; speed',
+        '1: N7:0', 'heartbeats and questions for the mode: 11.2 % of the time',
+        'Reads with Period 0 have the time that is left.']
+    assert ' '.join(told[heads:told.index('In words')]) == (
+        'Reads station from to words packets line ms total ms Period ms expected ms line tags '
+        '1 N7:0 N7:1 2 1 54.2 74.2 1000 1000 7.4% speed '
+        '1 N10:0 N10:0 1 1 52.1 72.1 500 500 14.4% alive 4 N7:0 N7:0 1 1 44.8 64.8 0 97 0.0% free')
+    assert 'station 4, N7:0: 1 word in 64.8 ms; Period 0; 0.0% of the time; free' in found.texts
+    assert [(bar['x'], bar['width']) for tag, bar in found.found
+            if tag == 'rect' and 'x' in bar][-3:] == [
+        ('110.0', '148.5'), ('258.5', '76.4'), ('334.9', '115.7')]
 
 
 def test_bars_are_in_proportion_to_their_times() -> None:

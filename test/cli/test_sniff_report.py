@@ -71,6 +71,7 @@ def test_bundle_has_all_that_a_report_needs(
     assert files['capture/line.cap'].startswith('# abdf1_ros capture 1\n')
     assert '1234 -2' in files['entries.txt']
     assert 'paint_booth' in files['settings/map.csv']
+    assert files['conformance/slave.json'] == '{"target": "slave"}\n'
     assert files['processors.txt'] == 'no diagnostic status was seen\n'
     assert set(json.loads(files['versions.json'])) == {'abdf1_ros', 'python', 'system'}
     for name in ('capture/', 'entries.txt', 'settings/'):
