@@ -384,7 +384,7 @@ def test_service_that_fails_answers_without_success(
 
 
 def test_node_whose_name_cannot_be_read_keeps_no_message_back(
-        make_bench: Benches, monkeypatch: pytest.MonkeyPatch) -> None:
+        make_bench: Benches, monkeypatch: pytest.MonkeyPatch, capfd: Output) -> None:
     def names(node: Node) -> None:
         raise UnicodeDecodeError('utf-8', b'/\xff', 1, 2, 'invalid start byte')
 
@@ -393,6 +393,7 @@ def test_node_whose_name_cannot_be_read_keeps_no_message_back(
     bench.publisher(Int16MultiArray, 'recipe')(5, 6)
     bench.until_results(1)
     assert bench.words('N7:4', 2) == [5, 6]
+    assert 'a periodic check has failed, all else goes on: UnicodeDe' in capfd.readouterr().err
 
 
 @pytest.mark.parametrize('arguments', [
@@ -518,8 +519,10 @@ def test_load_that_the_line_cannot_carry_is_told_before_other_remarks(
 
 
 def test_map_without_a_row_is_told(make_bench: Benches, capfd: Output) -> None:
-    make_bench()
-    assert 'the map has no usable row' in ''.join(capfd.readouterr())
+    make_bench(parameters=('map.gate.max:=7',))
+    told = ''.join(capfd.readouterr())
+    assert 'the map has no usable row' in told
+    assert 'without effect, because only the map file counts: map.gate.max\n' in told
 
 
 @pytest.mark.parametrize(('assignment', 'expected'), [

@@ -89,6 +89,11 @@ def test_message_that_another_thread_has_taken_is_no_error(offered: LosingPublis
 
 def test_closed_publisher_has_no_subscribers(offered: LosingPublisher) -> None:
     assert not offered.has_subscribers()
+    for _ in range(2):  # what waited is of the line that was lost
+        offered.withdraw()
+        assert not offered.waiting
+        offered.publish(UInt8())
+    offered.wait_for_all_acked(0.0)
 
 
 class Recorder:

@@ -17,10 +17,14 @@
 from contextlib import suppress
 from pathlib import Path
 import socket
+from unittest.mock import Mock
 
 from abdf1_ros.cli.sniff import main as sniff
 from abdf1_ros.client import Client
 from abdf1_ros.errors import RemoteError
+from abdf1_ros.ros.bridge.guests import GuestPlaces
+from abdf1_ros.settings.network import Network
+from abdf1_ros.share.guest_line import GuestLine
 import pytest
 from std_msgs.msg import Float32MultiArray
 from support.device_server import OWN_HOST
@@ -90,3 +94,14 @@ def test_what_is_not_allowed_and_who_is_turned_away_is_told_once(tmp_path: Path)
                       ', was refused: a place takes one program at a time')
         node.end()
     assert node.text.count('command refused') == 1
+
+
+def test_internal_error_in_the_line_of_a_guest_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(GuestLine, 'open_port', Mock(side_effect=KeyError('a bug')))
+    line, notes = Mock(network=Network(share='tcp:4501')), Mock()
+    places = GuestPlaces(line, Mock(), Mock(), notes, Mock())
+    for _ in range(2):
+        places.start()
+    places.lines[0].link.join()
+    notes.error.assert_called_with('guests', (
+        "internal error in the line of a guest: KeyError('a bug'); please report it"))

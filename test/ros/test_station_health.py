@@ -119,9 +119,9 @@ class Desk:
                                           lambda: self.woken.append('executor'))
         observer.node.create_service(Trigger, '~/read', self.service.answer,
                                      callback_group=MutuallyExclusiveCallbackGroup())
-        client = observer.node.create_client(Trigger, '~/read')
-        observer.until(client.service_is_ready, 'the service')
-        self.answer = client.call_async(Trigger.Request())
+        self.client = observer.node.create_client(Trigger, '~/read')
+        observer.until(self.client.service_is_ready, 'the service')
+        self.answer = self.client.call_async(Trigger.Request())
         self.ticks: list[float] = []
         observer.node.create_timer(0.01, lambda: self.ticks.append(time.monotonic()))
 
@@ -177,3 +177,7 @@ def test_service_ends_with_the_port(desk: Desk) -> None:
     desk.driver.checks.end('port lost: unplugged')
     desk.service.check(time.monotonic())
     assert desk.result() == (False, 'station 1: bytes 01 02; station 2: port lost: unplugged')
+    for number in (1, 2):
+        desk.driver.stations.lost(number, 0.0)
+    desk.answer = desk.client.call_async(Trigger.Request())
+    assert desk.result() == (False, 'no station to ask: no station is active')
