@@ -327,6 +327,8 @@ def test_mark_stays_at_its_line_where_others_come(monkeypatch: pytest.MonkeyPatc
         assert chosen(plant, key) == ''
     assert chosen(plant, ord('\n')) == 'line21'
     assert {('line20', 0), ('line21', curses.A_REVERSE)} <= {*window.drawn.values()}
+    assert [chosen(plant, key) for key in (curses.KEY_END, ord('\n'))] == ['', 'line59']
+    assert ('line59', curses.A_REVERSE) in window.drawn.values()
 
 
 def test_line_stays_marked_while_its_picture_is_shown(monkeypatch: pytest.MonkeyPatch) -> None:
