@@ -167,12 +167,12 @@ def test_log_file_gets_no_colours(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     for module, name in ((os, '_exit'), (signal, 'signal')):
         monkeypatch.setattr(module, name, lambda *args: None)
     paths = source, out, log = [tmp_path / name for name in ('source', 'out', 'log')]
-    source.write_bytes(b'\x1b[33mwarning\x1b[0m\n')
+    source.write_bytes(b'\x1b[33mwarning\x1b[0m\nlast')  # a crash ends in a line
     with ExitStack() as stack:
         numbers = [stack.enter_context(path.open('ab+')).fileno() for path in paths]
         os.lseek(numbers[0], 0, os.SEEK_SET)
         console.relay(['{}:{},{}'.format(*numbers)])
-    assert (out.read_bytes(), log.read_bytes()) == (source.read_bytes(), b'warning\n')
+    assert (out.read_bytes(), log.read_bytes()) == (source.read_bytes(), b'warning\nlast')
 
 
 def test_line_that_is_too_long_is_counted(tmp_path: Path) -> None:
