@@ -146,6 +146,10 @@ def test_stations_behind_a_gateway_are_what_it_is() -> None:
     stations.heard(10, 6.0)
     assert changes[3:] == [(10, True), (2, True), (3, True)]
     assert (stations[10].last_heard, stations[2].last_heard) == (6.0, None)
+    for number in (2, 3):
+        stations.lost(number, 7.0)
+    stations.heard(2, 8.0)  # it alone, as the gateway answered all the time
+    assert changes[6:] == [(2, False), (3, False), (2, True)]
 
 
 def test_seven_times_as_long_is_left_to_others() -> None:
