@@ -93,8 +93,8 @@ class Trace:
     def _tell_lost(self) -> None:
         if lost := self._lost - self._told:
             self._told += lost
-            self._writer.write(f'# {lost} lines were lost here: the disk was too slow')
-            self._on_error(f'{self._path}: the disk was too slow; {lost} lines were lost')
+            self._writer.write(f'# lines lost here: {lost}; the disk was too slow')
+            self._on_error(f'{self._path}: the disk was too slow; lines lost: {lost}')
 
 
 class TracedPort(PortAround):

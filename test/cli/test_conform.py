@@ -31,6 +31,7 @@ import pytest
 from support.cases import for_all
 from support.commands import Output, running_simulator
 from support.driver_bench import simulated_plc
+from support.odd_device import frame
 from support.plc_line import plc_line
 from support.ptys import Pty
 
@@ -73,6 +74,8 @@ def test_failure_is_the_exit_status_and_shows_the_bytes(
 
 
 def test_report_is_markdown(port: str, capsys: Output) -> None:
+    with open(port, 'wb', buffering=0) as line:  # its reply lies there
+        line.write(frame(b'\1\0\6\0\7\7\3', 1))
     assert main(['slave', '--port', port, '--report', *QUICK]) == 0
     text = capsys.readouterr().out
     assert text.startswith(

@@ -205,7 +205,7 @@ def test_other_type_is_told_once_and_again_when_it_comes_back(
     told = [f'/cell/abdf1/write/door is {BITS}; another node uses it as std_msgs/msg/Bool, '
             'and DDS does not connect different types']
     assert [texts(watch.look(now)) for now in (10.0, 20.0)] == [told, []]
-    domain.topics['/cell/abdf1/write/door'] = [BITS]
+    domain.topics = {'/cell/abdf1/write/door': [BITS]}
     assert watch.look(30.0) == []
     domain.topics['/cell/abdf1/write/door'] = [BITS, 'std_msgs/msg/Bool']
     assert texts(watch.look(40.0)) == told

@@ -84,6 +84,9 @@ def test_value_is_the_last_column_to_go() -> None:
         shown = row
     long = Reading('a_topic_of_some_length', [1], received=NOW)
     assert line_with('a_topic_of_some_l... ', snapshot(readings=[long]), 60).style is Style.PLAIN
+    loads = ShownStatus('link', Style.GOOD, 'OK', {'line load by topic': f'{"x" * 40} 3.1%'})
+    assert '3.1%' in line_with('xxx... ', snapshot(
+        statuses=[loads], readings=[Reading('x' * 40, [1], received=NOW)])).text
 
 
 def test_every_part_can_be_found_by_its_first_line() -> None:
