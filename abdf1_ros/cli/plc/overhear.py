@@ -91,7 +91,8 @@ def heard_reads(network: Network, seconds: float) -> list[Carried]:
     """
     overhearing = Overhearing(network)
     for at, data in _bytes_of(network, seconds):
-        overhearing.hear(Chunk(at, Direction.UNKNOWN, data))  # a second port gives SecondPort
+        # Bytes of a second port are marked by their class, SecondPort.
+        overhearing.hear(Chunk(at, Direction.UNKNOWN, data))
     return overhearing.carried
 
 
