@@ -92,7 +92,7 @@ class Sink(threading.Thread):
             if not data and not lost:
                 return
             if lost:
-                data += b'[WARN] abdf1_ros: %d lines were lost here: they were not taken\n' % lost
+                data += b'[WARN] abdf1_ros: lines lost here, as they were not taken: %d\n' % lost
             try:
                 while data:
                     data = data[self._write(data):]

@@ -25,6 +25,7 @@ from typing import Any
 from abdf1_ros.numbers import is_digits, whole_number
 
 LOOPBACK = '127.0.0.1'
+MOST_PORT = 65535
 
 
 # Major numbers of pseudo-terminals (Linux, admin-guide/devices.txt). Each mount of devpts, for
@@ -64,7 +65,7 @@ def host_and_port(text: str, default: str = LOOPBACK) -> tuple[str, int]:
     number = whole_number(port) if is_digits(port) else None
     with suppress(UnicodeError):
         host = host.removeprefix('[').removesuffix(']').encode('idna').decode()
-        if colon and number is not None and 0 <= number <= 65535:
+        if colon and number is not None and 0 <= number <= MOST_PORT:
             return host or default, number
     raise ValueError(f'"{text}" should be HOST:PORT')
 

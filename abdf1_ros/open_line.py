@@ -47,7 +47,7 @@ from abdf1_ros.ports.opening import name_port, open_port
 from abdf1_ros.ports.ownership import line_of
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.problems import ConfigurationError, Problem
-from abdf1_ros.text import shown
+from abdf1_ros.text import counted, shown
 
 if TYPE_CHECKING:
     from abdf1_ros.plan.line_model import LineModel
@@ -264,7 +264,7 @@ class OpenLine:
                 self.log.log(level, '%s', text, exc_info=error)
         if lost := self._lost - self._lost_reported:
             self._lost_reported += lost
-            self.log.warning('%d entries were lost here: nothing was asked meanwhile', lost)
+            self.log.warning('%s lost here: nothing was asked meanwhile', counted(lost, 'entry'))
 
 
 def traced(path: str, port: PortSettings, check: str, duplex: Duplex, open_it: Callable[[], Port],

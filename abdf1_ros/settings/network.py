@@ -32,7 +32,7 @@ from abdf1_ros.df1.modes import mode_of, MODES
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.settings import LinkOptions, LinkSettings
 from abdf1_ros.df1.stations import MAX_STATION
-from abdf1_ros.line_names import device_of
+from abdf1_ros.line_names import device_of, MOST_PORT
 from abdf1_ros.messages import Message
 from abdf1_ros.numbers import is_digits, one_of, TEXT, ValueKind, whole, whole_number
 from abdf1_ros.pccc.families import FAMILIES
@@ -49,7 +49,6 @@ MODE_NAMES = tuple(dict.fromkeys(mode.name for mode in MODES))
 _Cell = TypeVar('_Cell', int, str, bool)
 POLLING_MODES = tuple(mode.polling for mode in MODES if mode.polling)
 _HOST = re.compile(r'(?P<scheme>\w+://)?(?P<host>(?!tcp:)[\w.-]+?)(?P<port>:\d{2,5})?')
-_MOST_PORT = 65535
 PLC_TYPES = tuple(entry.value for entry in FAMILIES)
 # Schemes of the URLs of device servers; each has a module in ``ports``.
 DEVICE_SERVERS = ('socket', 'rfc2217')
@@ -328,8 +327,8 @@ def _port_fault(text: str) -> str:
     match = _HOST.fullmatch(text)
     if match and match['port'] and not _is_host(match['host']):
         advice = f'"{shown(match["host"])}" is not the name of a host'
-    elif match and match['port'] and int(match['port'][1:]) > _MOST_PORT:
-        advice = f'a port is at most {_MOST_PORT}'
+    elif match and match['port'] and int(match['port'][1:]) > MOST_PORT:
+        advice = f'a port is at most {MOST_PORT}'
     elif match and match['port']:
         advice = f'write socket://{shown(match["host"])}{match["port"]}'
     elif match and match['scheme']:

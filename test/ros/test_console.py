@@ -38,7 +38,7 @@ from support.ros import Observer, ros_args, write_csv
 ROWS = ('speed,Write,N7:0,1,PLC5,1,speed,-1,500', 'refused,Write,N7:99,1,PLC5,1,refused,,')
 DATA = 'Station,PLC_Type,Address,Length,Values\n1,PLC5,N7:0,4,0 0 0 0\n'
 NET = 'Com_Port,Baud,Timeout,Cmd_Timeout\n/dev/plc,115200,300,3000\n'
-LOST = b'[WARN] abdf1_ros: %d lines were lost here: they were not taken\n'
+LOST = b'[WARN] abdf1_ros: lines lost here, as they were not taken: %d\n'
 
 
 def unread_pipe(stack: ExitStack) -> int:
