@@ -161,6 +161,8 @@ class Story:
         See that all is as at first when nothing is wrong any more: values, writes, beats.
 
         On a line so full that a counter is read too rarely, rows that depend on it stay withheld.
+        A row that was written makes way once its PLC has a beat, which may need new values of it:
+        a full line drops most values, and takes one from each row only if the others make way.
         """
         world = self.world
         self._rates.clear()
@@ -174,7 +176,7 @@ class Story:
                        if number not in self.judge.owner.since}
         while wanted and world.line.now < end:
             for row in world.messages:
-                if self.dice.random() < 0.02:
+                if self.dice.random() < 0.02 and wanted & {row.tag, f'beat_{row.station}'}:
                     world.publish(row)
             self.wait(STEP)
             wanted -= {result.mapping.tag for result in world.results[results:]

@@ -55,6 +55,13 @@ def test_seed_replays_a_plant_to_the_byte(mode: str) -> None:
     assert bytes_of_a_run() == bytes_of_a_run()
 
 
+def test_line_full_of_beats_recovers_one_row_after_another(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    full = Plant('Radio', stations=3, rows=3, after=600, period=500, baud=9600, retries=1)
+    monkeypatch.setattr(Plant, 'drawn', lambda dice, mode: full)
+    Story(4, turns=1, is_steady=False).run()
+
+
 def test_plc_need_not_be_known_that_a_master_still_has_as_inactive() -> None:
     world = World(Plant('Slave'), seed=1)
     rule = View(world)
