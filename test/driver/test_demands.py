@@ -240,6 +240,19 @@ def test_refusal_is_told_with_its_number_and_the_row_stays_failed() -> None:
     assert line.packets - before <= 1  # that of the other row
 
 
+def test_call_is_told_its_own_failure_and_not_that_of_an_earlier_call() -> None:
+    row = make_mapping('N99:0', is_on_demand=True, condition=While(('RUN',)))
+    line = Line(row, run=6.0)
+    line.ask(row, run=1.0)
+    line.there.table.create(row.address, 1)
+    line.there.processor.setting = Setting.PROGRAM
+    line.run(20.0)
+    line.ask(row, run=1.0)
+    line.there.faults.slow = 100_000  # polls get EOT
+    line.ask(row, run=30.0)
+    assert [error[:4] for error in line.errors] == ['STS ', 'with', '2508']
+
+
 def test_shorter_packets_of_a_small_processor_are_found() -> None:
     row = make_mapping('N7:0', plc='SLC', length=100, is_on_demand=True)  # as of a 5/03
     line = DriverBench([row], settings=DriverSettings(processor_period=0.0))

@@ -145,6 +145,8 @@ class Readings:
 
     def _answer(self, point: ReadPoint, words: bytes | None,
                 error: Exception | None) -> ReadAnswer:
+        if isinstance(error, LinkError):
+            return ReadAnswer(error=str(error))
         if text := point.error or point.withheld and f'withheld: {point.withheld}':
             return ReadAnswer(error=text)
         if words is None:
@@ -200,7 +202,7 @@ class Readings:
         """Update a point with words that were read from ``started`` on, unless it is withheld."""
         if reason := guard.why_not(point, started, self._line.now):
             if point.mapping.is_on_demand:  # the call gets the reason
-                point.withheld = reason
+                point.withheld, point.error = reason, None
             else:
                 self._withhold(point, guard, reason)
         elif point in guard.withheld:
