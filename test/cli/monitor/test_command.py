@@ -361,10 +361,12 @@ def test_one_picture_has_colours_on_a_terminal(
         shown = re.search(r'\x1b\[(\d+)m  link +(OK|WARN|ERROR): ', screen.drawn)
         assert shown  # a busy host may let the simulator stand still
         assert shown[1] == {'OK': '32', 'WARN': '33', 'ERROR': '31'}[shown[2]]
+        assert '▁' in screen.drawn
     monkeypatch.setenv('NO_COLOR', '1')
-    with terminal('--node', NODE, '--once') as screen:
+    with terminal('--node', NODE, '--once', term='linux') as screen:
         assert screen.result() == 0
         assert 'OK: ' in screen.drawn
+        assert screen.drawn.isascii()
         assert '\x1b' not in screen.drawn
 
 
