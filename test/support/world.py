@@ -270,7 +270,7 @@ class WatchedPlc:
     preset: float = 0.0  # s, of the watchdog of its ladder, 0 where it has none
     # What the lamps of its ladder showed, with the time, and which of them are on.
     lamps: list[tuple[float, Lamp, bool]] = field(default_factory=list)
-    shown: deque[Shown] = field(default_factory=lambda: deque(maxlen=100))
+    shown: deque[Shown] = field(default_factory=lambda: deque(maxlen=1000))
     tags: dict[str, str] = field(init=False)  # by address
     place_of: Callable[[str], Address] = field(init=False)
 
