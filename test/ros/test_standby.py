@@ -17,7 +17,6 @@
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
-import socket
 from types import SimpleNamespace
 from typing import Any
 from unittest.mock import MagicMock, Mock
@@ -30,6 +29,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 import pytest
 from std_msgs.msg import Int16MultiArray, UInt16MultiArray
 from std_srvs.srv import SetBool, Trigger
+from support.device_server import QueueingServer
 from support.ros import BridgeCell, Observer, OK, ros_args, WARN, write_csv
 
 NET = 'NAK_Retries,ENQ_Retries,Cmd_Timeout,Baud,Timeout\n1,1,5000,115200,3000\n'
@@ -225,22 +225,29 @@ def test_change_that_waits_for_the_executor_is_not_begun_again() -> None:
     assert tasks == [standby.leave_line]
 
 
-def test_spare_in_the_queue_of_a_device_server_waits_and_blames_no_plc(
+def test_spare_in_the_queue_of_a_device_server_waits_and_keeps_its_line_over_a_reload(
         tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    with socket.create_server(('127.0.0.1', 0)) as server, Observer() as ros:  # accepts, is silent
-        write_csv(tmp_path / 'net.csv', NET.splitlines()[0], NET.splitlines()[1:])
-        write_csv(tmp_path / 'map.csv', ROWS.splitlines()[0], ROWS.splitlines()[1:])
-        port = f'socket://127.0.0.1:{server.getsockname()[1]}'
-        diagnostics = ros.diagnostics(port)
+    server = QueueingServer()
+    write_csv(tmp_path / 'net.csv', 'Mode,Baud,Timeout,Cmd_Timeout', ['Peer,19200,200,500'])
+    write_csv(tmp_path / 'map.csv', 'Tag,Command,Address,Station,PLC_Type',
+              ['speed,Read,N7:0,1,SLC'])
+    with Observer() as ros:
+        diagnostics = ros.diagnostics(server.url)
         spare = BridgeNode(context=ros.context, use_global_arguments=False, cli_args=ros_args(
             f'net_file:={tmp_path / "net.csv"}', f'map_file:={tmp_path / "map.csv"}',
-            f'port:={port}', 'standby:=true'))
+            f'port:={server.url}', 'standby:=true'))
         ros.run(spare)
         try:
             diagnostics.until(lambda array: array.status[0].message.endswith(
                 'the port is open, and no station has answered'), 'the spare to wait')
             assert not ros.node.count_publishers('/abdf1/write_results')
             assert not {service.srv_name[2:] for service in spare.services} & {*SERVICES}
+            server.take_over()
+            ros.until(lambda: ros.node.count_publishers('/abdf1/read/speed') == 1, 'the line')
+            assert ros.call(Trigger, '/abdf1/reload', Trigger.Request()).success
+            assert spare.session.has_line  # its port is still open
         finally:
             ros.end(spare)
-    assert 'before the PLC has confirmed' not in capfd.readouterr().err
+            server.close()
+    said = capfd.readouterr().err
+    assert 'before the PLC has confirmed' not in said and 'has lost the line' not in said

@@ -144,7 +144,8 @@ class BridgeSession:
         self.link_counters = LinkCounterService(
             self.driver, self._wake_link, surroundings.wake_executor)
         self._port_text = ''
-        self._opened = math.inf
+        # Of an open port that a reload keeps: our line if it was, or from the first answer on.
+        self._is_ours, self._opened = surroundings.is_offered, -math.inf
         self.levels: list[bytes] = []
         self.next_diagnostics = self._next_snapshot = 0.0
         self._snapshot: Snapshot | None = None
@@ -184,10 +185,11 @@ class BridgeSession:
 
         A device belongs to us while it is open. A device server may accept our connection and
         still keep us waiting; so with a device server, a station has to answer first.
+        A reload on the same connection changes nothing in that.
         """
         stations = [*self.driver.stations]
         return self._surroundings.link.state.is_open and (
-            '://' not in self.port or not stations
+            '://' not in self.port or not stations or self._is_ours
             or any(station.last_heard is not None and station.last_heard >= self._opened
                    for station in stations))
 
@@ -268,7 +270,7 @@ class BridgeSession:
         if state.text == self._port_text:
             return  # the attempt has failed for the same reason as the last one
         self._port_text = state.text
-        self._opened = line_time() if state.is_open else math.inf
+        self._is_ours, self._opened = False, line_time()
         self.events.port_changed()
         self._publish_active()
         # a spare does not log this: a device server may accept and close its connection every
