@@ -150,6 +150,7 @@ def test_line_that_is_left_goes_to_the_spare(pair: Pair) -> None:
     assert pair.node.link.is_released
     pair.ros.call(Trigger, '/abdf1/reset_counters', Trigger.Request())
     pair.node.set_polling(SetBool.Request(data=True), SetBool.Response())
+    pair.ros.until(lambda: pair.services() == dict.fromkeys(SERVICES, 1), 'a spare without any')
     pair.ros.end(pair.spare)
     pair.spare = None
     pair.ros.until(lambda: pair.counts == (1, 1), 'the first bridge to have the line again')

@@ -62,12 +62,19 @@ class Standby:
                     service.kind, service.name, service.answer, callback_group=service.group)
 
     def look(self) -> None:
-        """Begin to offer if the bridge has got the line; begin to wait if it has lost the line."""
+        """
+        Begin to offer if the bridge has got the line; begin to wait if it has lost the line.
+
+        After a released port is taken back, a bridge without the line closes its last services.
+        """
         has_line, executor = self._session().has_line, self._surroundings.node.executor
-        if has_line is self._surroundings.is_offered or self._is_changing or executor is None:
+        is_offered = self._surroundings.is_offered
+        has_rest = not is_offered and self._made and not self._surroundings.link.is_released
+        if has_line is is_offered and not has_rest or self._is_changing or executor is None:
             return
         self._is_changing = True
-        executor.create_task(self._take_line if has_line else self.leave_line)
+        executor.create_task(
+            self._take_line if has_line else self.leave_line if is_offered else self._close)
 
     def _take_line(self) -> None:
         """Offer everything: the bridge has the line."""
@@ -82,10 +89,14 @@ class Standby:
         node = self._surroundings.node
         node.get_logger().warning('has lost the line: waits, and offers no topics and services')
         self._surroundings.is_offered = False
-        for service in [*self._made]:
-            if not service.stays or not self._surroundings.link.is_released:
-                node.destroy_service(self._made.pop(service))
         self._session().withdraw()
         for publisher in self._publishers:
             publisher.withdraw()
+        self._close()
+
+    def _close(self) -> None:
+        """Close the services, except for those that have to take a released port back."""
+        for service in [*self._made]:
+            if not service.stays or not self._surroundings.link.is_released:
+                self._surroundings.node.destroy_service(self._made.pop(service))
         self._is_changing = False
