@@ -909,6 +909,15 @@ def test_last_fallback_value_of_a_station_is_told_with_its_cause(make_bench: Ben
     bench.written(Write(row, [0], NOW).result(Outcome.WRITTEN), NOW + 1)
     assert bench.seen.last_fallbacks == {1: ('speed: timeout', NOW)}
 
+    class Another(str):  # what the thread of the link does at this moment
+        def __format__(self, kind: str) -> str:
+            bench.seen.last_fallbacks[2] = self, NOW
+            return str(self)
+
+    bench = make_bench('alive,Heartbeat,N10:0,1,PLC5,500')
+    bench.seen.last_fallbacks[1] = Another('speed: timeout'), NOW
+    assert bench.details('interlocks')['station 1 last fallback'] == 'speed: timeout (0.0 s ago)'
+
 
 def test_publisher_whose_clock_is_ahead_is_named_for_ten_seconds(bench: Bench) -> None:
     bench.events.ahead('level', 1.9, ['/panel'])

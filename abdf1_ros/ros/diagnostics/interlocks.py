@@ -126,7 +126,7 @@ class InterlockStatus:
         return {
             **{f'station {number}': text for number, (_, text) in stations.items()},
             **{f'station {number} last fallback': with_age(moment, now)
-               for number, moment in self._watched.last_fallbacks.items()},
+               for number, moment in [*self._watched.last_fallbacks.items()]},
             **{beat.mapping.tag: self._beat(beat, now) for beat in self._beats},
             **{row.mapping.tag: _fallback(row) for row in self._fallbacks},
             **{f'bound of {bound.mapping.tag}': _bound(bound) for bound in self._bounds}}

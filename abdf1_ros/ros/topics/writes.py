@@ -175,7 +175,8 @@ class WriteTopics:
         self._has_begun = self.is_open = False
         self._subscriptions: dict[str, tuple[type, Subscription]] = {}
         self._topics: dict[str, WriteTopic] = {}
-        self.latest: dict[tuple[str, int, int], None] = {}  # topic, stamp and number of messages
+        # Stamp and number of the latest messages of each topic; a busy topic drives out no other.
+        self.latest: defaultdict[str, dict[tuple[int, int], None]] = defaultdict(dict)
         self.standstills = Standstills()
         self.taken = 0
 
@@ -256,10 +257,11 @@ class WriteTopics:
         stamp, number = info['source_timestamp'], info['publication_sequence_number']
         if not stamp or number is None:
             return False
-        came_before = (topic, stamp, number) in self.latest
-        self.latest[topic, stamp, number] = None
-        if len(self.latest) > MAX_WAITING_WRITES:
-            del self.latest[next(iter(self.latest))]
+        latest = self.latest[topic]
+        came_before = (stamp, number) in latest
+        latest[stamp, number] = None
+        if len(latest) > MAX_WAITING_WRITES:
+            del latest[next(iter(latest))]
         return came_before
 
     def _subscription(self, topic: str, kind: type) -> Subscription:
