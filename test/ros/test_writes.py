@@ -157,7 +157,7 @@ def test_messages_wait_in_their_order_until_the_node_has_begun(
                          'b 4', "b: ['/panel_b'] ahead by 1.5 s",
                          'b 5: its time stamp is 2.6 s ahead of the clock here, write_timeout is '
                          '2 s; the clocks differ, so its age is unknown']
-    assert topics.taken == 8
+    assert (topics.taken, node.wakes) == (8, 5)
     assert node.requests == node.stamps
 
 
@@ -175,13 +175,6 @@ def test_message_that_dds_delivers_again_after_a_cut_is_not_written_again(
         node.publish('a', number, times=2)
     assert len(node.said) == 4 + 1998
     assert {topic: len(latest) for topic, latest in topics.latest.items()} == {'a': 1000, 'b': 1}
-
-
-def test_message_wakes_the_link(node: Taker, topics: WriteTopics) -> None:
-    topics.begin()
-    node.tasks[0]()
-    node.publish('a', 1)
-    assert (node.said, node.wakes) == (['a 1'], 1)
 
 
 def test_messages_that_are_too_many_to_wait_are_refused(node: Taker, topics: WriteTopics) -> None:
@@ -221,6 +214,15 @@ def test_message_that_waits_for_rows_which_a_reload_takes_away_or_that_fails_end
         topics.standstills.look(line_time() - before)
     node.publish('c', 1)
     assert node.said[2].startswith('c 1: it came 9.0 s after it was published')
+
+
+def test_message_that_waits_when_the_line_is_lost_is_never_written(
+        node: Taker, topics: WriteTopics) -> None:
+    node.publish('a', 1)
+    topics.withdraw()
+    topics.begin()
+    node.tasks[0]()
+    assert node.said == []
 
 
 def test_row_of_another_message_type_has_another_subscription(
