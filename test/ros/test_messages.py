@@ -55,7 +55,9 @@ def test_every_value_type_has_its_message() -> None:
     ('B3:3', {'Length': 5}, msg.UInt16MultiArray), ('F8:3', {'Length': 5}, msg.Float32MultiArray),
     ('L10:3', {'Length': 5}, msg.Int32MultiArray),
     ('N7:3', {'Length': 5, 'Type': 'uint32'}, msg.UInt32MultiArray),
-    ('N7:3', {'Length': 5, 'Type': 'bcd16'}, msg.UInt16MultiArray)])
+    ('N7:3', {'Length': 5, 'Type': 'bcd16'}, msg.UInt16MultiArray),
+    ('N7:3', {'Length': 5, 'Scale': 0.1}, msg.Float32MultiArray),
+    ('N7:3', {'Length': 5, 'Offset': 1, 'Type': 'uint32'}, msg.Float32MultiArray)])
 def test_layout_says_what_the_values_are(
         tmp_path: Path, address: str, cells: dict[str, object], kind: Any) -> None:
     message = messages.new_message(make_mapping(tmp_path, address, **cells))
@@ -63,15 +65,6 @@ def test_layout_says_what_the_values_are(
     (dimension,) = message.layout.dim
     assert (dimension.label, dimension.size, dimension.stride) == (address, 5, 5)
     assert message.layout.data_offset == 0
-
-
-@pytest.mark.parametrize(('address', 'cells'), [
-    ('N7:3', {'Scale': 0.1}), ('N7:3', {'Offset': 1, 'Type': 'uint32'}), ('F8:3', {'Scale': 2})])
-def test_engineering_values_are_float32(
-        tmp_path: Path, address: str, cells: dict[str, object]) -> None:
-    message = messages.new_message(make_mapping(tmp_path, address, Length=2, **cells))
-    assert type(message) is msg.Float32MultiArray
-    assert (message.layout.dim[0].label, message.layout.dim[0].size) == (address, 2)
 
 
 @pytest.mark.parametrize(('address', 'cells'), [
@@ -181,10 +174,3 @@ def test_write_topic_keeps_a_burst_but_nothing_from_before() -> None:
     assert profile.reliability is qos.ReliabilityPolicy.RELIABLE
     assert profile.durability is qos.DurabilityPolicy.VOLATILE
     assert profile.depth >= 1000  # as many as may wait for the line
-
-
-def test_latched_topic_keeps_one() -> None:
-    profile = messages.latched_qos()
-    assert profile.reliability is qos.ReliabilityPolicy.RELIABLE
-    assert profile.durability is qos.DurabilityPolicy.TRANSIENT_LOCAL
-    assert profile.depth == 1
