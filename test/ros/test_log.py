@@ -70,19 +70,6 @@ def test_every_message_has_the_level_of_its_table(
     assert text.endswith(' [station 2]')
 
 
-def test_one_logger_takes_events_of_all_levels(log: EventLog, logged: Logged) -> None:
-    for message in Message:
-        log.add(event(message))
-    assert {level for level, _ in logged()} == {'FATAL', 'ERROR', 'INFO'}
-
-
-def test_cause_is_logged_once(log: EventLog, clock: Clock, logged: Logged) -> None:
-    for _ in range(100):
-        log.add(event(Message.ERR_BAD_CRC))
-        clock.now += 1.0
-    assert [text.split(':')[0] for _, text in logged()] == ['2506 ERR_BAD_CRC']
-
-
 def test_details_do_not_make_another_cause(log: EventLog, logged: Logged) -> None:
     log.add(Event(Message.ERR_WRONG_MESSAGE, (1, 5, 10), 1))
     log.add(Event(Message.ERR_WRONG_MESSAGE, (1, 5, 11), 1))
