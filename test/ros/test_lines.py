@@ -128,12 +128,11 @@ def test_parameter_file_that_ros_would_refuse(tmp_path: Path, text: str, expecte
 
 
 def test_what_is_left_out_changes_nothing_else(tmp_path: Path) -> None:
+    kept = "  a:\n    ros__parameters: {day: 2001-99-99, no-1: 010, text: '5', list: [1, 2]}\n"
     path = yaml_file(tmp_path, (
-        'hall/press-plc:\n  ros__parameters: {}\n'
-        "a:\n  ros__parameters: {day: 2001-99-99, number: 010, text: '5', list: [1, 2]}\n"))
+        f'hall/press-plc:\n  ros__parameters: {{}}\nhall:\n  b-1: {{c: {{}}}}\n{kept}'))
     with usable_files(['--params-file', path], leaves_out=True) as (_, usable):
-        assert Path(usable).read_text('utf-8') == (
-            "a:\n  ros__parameters: {day: 2001-99-99, number: 010, text: '5', list: [1, 2]}\n")
+        assert Path(usable).read_text('utf-8') == f'hall:\n{kept}'
 
 
 def test_temporary_folder_is_asked_for_only_where_a_name_is_left_out(

@@ -298,12 +298,13 @@ def test_missing_files_are_problems(make_node: Nodes) -> None:
 
 
 def test_bad_row_is_left_out_unless_the_map_is_strict(make_node: Nodes, files: Files) -> None:
-    write_csv(Path(files['map_file']), MAP_HEADER, ['bad,Read,N7:0,300,SLC,,,', *MAP])
+    write_csv(Path(files['map_file']), MAP_HEADER, [
+        'bad,Read,N7:0,300,SLC,,,', *MAP, 'ours,Read,N7:0,5,SLC,,,'])
     configuration = configure(make_node(files))
     assert [mapping.tag for mapping in configuration.mappings] == ['recipe', 'line/door']
-    (problem,) = configuration.map_problems
-    assert '2501 ERR_BAD_STATION: Item: 1, ' in str(problem)
-    assert problems_of(make_node(files | {'strict_map': True})) == [str(problem)]
+    bad, ours = map(str, configuration.map_problems)
+    assert '2501 ERR_BAD_STATION: Item: 1, ' in bad and 'Station 5 is our own Station' in ours
+    assert problems_of(make_node(files | {'strict_map': True})) == [bad, ours]
 
 
 def test_mappings_are_shown_with_their_defaults(configured: Configured) -> None:

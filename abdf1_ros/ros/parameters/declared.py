@@ -404,7 +404,6 @@ def _declare(node: Node, given: Given, name: str, default: object,
     """
     if name in _PATHS and isinstance(value := given.get(name), str):
         path = os.path.expanduser(value)  # the shell does not expand net_file:=~/net.csv
-        descriptor.dynamic_typing = False
         node.declare_parameter(name, _resolved(path), descriptor, ignore_override=True)
         return path
     try:
