@@ -36,8 +36,6 @@ from abdf1_ros.ros.process import main as process
 from abdf1_ros.signals import EndRequest
 from abdf1_ros.testing import Plcs
 import pytest
-from rcl_interfaces.msg import Parameter, ParameterValue
-from rcl_interfaces.srv import SetParameters
 from rclpy.node import Node
 from rclpy.utilities import get_default_context
 from std_msgs.msg import Int16MultiArray
@@ -279,6 +277,8 @@ def plant(tmp_path: Path, end_request: EndRequest,
         plant.end()
         assert not [thread for thread in threading.enumerate() if thread.name == 'callbacks']
         assert not get_default_context().ok()
+        plant.observer.until(lambda: not {'lines', *plant.nodes} & {
+            *plant.observer.node.get_node_names()}, 'the end of all nodes')
 
 
 def line_status(plant: Plant, level: bytes) -> dict[str, str]:
@@ -451,20 +451,6 @@ def test_internal_error_restarts_its_line_only_and_its_slow_end_holds_up_no_othe
     said = capfd.readouterr().err
     assert 'has ended by an internal error and is started again' in said
     assert 'Traceback' in said
-
-
-def test_call_that_no_client_library_would_send_ends_no_line(plant: Plant) -> None:
-    plant.start(reads='ab')
-    before = {**plant.nodes}
-    odd = Parameter(name='read_only', value=ParameterValue(type=200))
-    for name in ('/lines', '/hall/a', '/lines', '/lines', '/lines'):
-        result, = plant.observer.call(SetParameters, f'{name}/set_parameters',
-                                      SetParameters.Request(parameters=[odd])).results
-        assert not result.successful
-        assert '200 is not a valid Parameter.Type' in result.reason
-    assert plant.speeds('b') == [7, ord('b')]
-    assert plant.nodes == before
-    assert line_status(plant, OK)['restarts'] == '0'
 
 
 def test_status_of_all_lines_comes_once_a_second(plant: Plant) -> None:
