@@ -16,6 +16,7 @@
 
 from collections.abc import Callable, Coroutine, Iterator
 from datetime import datetime, UTC
+import math
 from pathlib import Path
 import signal
 import threading
@@ -221,12 +222,13 @@ def test_map_of_many_rows_has_the_services_that_matter(
 def test_publisher_and_caller_of_one_fallback_row_are_two_owners(bench: Bench) -> None:
     client = bench.ros.node.create_client(SetBool, SET + 'motor')
     bench.ros.until(lambda: count_owners(bench.node, 'motor') == 1, 'the caller')
-    assert bench.node.session.owners.look(float('inf')) == ()
+    assert bench.node.session.owners.look(math.inf) == ()
     publisher = bench.ros.publisher(UInt8MultiArray, '/abdf1/write/motor')
-    bench.ros.until(lambda: bench.node.session.owners.look(float('inf')) == ('motor',),
-                    'both owners')
+    bench.ros.until(lambda: bench.node.session.owners.look(math.inf) == ('motor',), 'both owners')
     bench.ros.node.destroy_client(client)
     bench.ros.node.destroy_publisher(publisher)
+    bench.ros.until(lambda: not count_owners(bench.node, 'motor'), 'none')
+    assert [bench.node.session.owners.look(now) for now in (0.0, math.inf)] == [('motor',), ()]
 
 
 def test_old_call_is_not_written_and_the_end_answers_who_waits(tmp_path: Path) -> None:
@@ -378,8 +380,8 @@ def test_services_of_rows_that_are_gone_close_once_when_no_call_waits() -> None:
         call.send(None)
     assert ended(late) == (False, 'refused: 100 calls wait already')
     for take in node.takes[1:]:
-        take(ReadAnswer(error='no'))
-    assert {*map(ended, crowd)} == {(False, 'no')}
+        take(ReadAnswer('Tank\x1b', line_time()))
+    assert {text.partition(' at ')[0] for _, text in map(ended, crowd)} == {r'Tank\x1b'}
     puts[3].send(None)
     last = node.made['~/read_now/n1'](Trigger.Request(), Trigger.Response())
     last.send(None)

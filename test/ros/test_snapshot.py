@@ -67,7 +67,7 @@ def test_single_value_has_all_that_is_known_of_it() -> None:
     ('B3:0/15', 2, '', array('B', [1, 0]), ['value B3:0/15', 'value lamp']),
     ('N7:0', 2, 'int32', array('i', [1, 2]), ['value N7:0', 'value N7:2']),
     ('N7:0', 33, '', array('h', range(33)), ['value']),
-    ('ST9:0', 1, '', 'text', ['value'])])
+    ('ST9:0', 1, '', '', ['value'])])
 def test_each_value_of_an_array_has_a_key(
         address: str, length: int, kind: str, values: array | str, keys: list[str]) -> None:
     row = make_mapping(address, length=length, kind=kind)
