@@ -76,7 +76,8 @@ class TwoPorts(_SilentPort):
             self._poll.register(wake, select.POLLIN)
             self._wake = wake
         milliseconds = None if timeout is None else math.ceil(timeout * 1000)
-        ready = {descriptor for descriptor, _ in self._poll.poll(milliseconds)}
+        ready = {port.fileno() for port in (self._first, self._second) if port.has_pieces} or {
+            descriptor for descriptor, _ in self._poll.poll(milliseconds)}
         if self._first.fileno() in ready and (data := self._first.read(0, wake)):
             return data
         if self._second.fileno() not in ready:

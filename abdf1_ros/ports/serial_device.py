@@ -186,6 +186,11 @@ class SerialDevice(DescriptorPort):
                 raise OSError('another program has changed the settings of the port')
         super().write(data)
 
+    @property
+    def has_pieces(self) -> bool:
+        """Return True if the next ``read`` returns bytes that the system has given already."""
+        return bool(self._pieces)
+
     def read(self, timeout: float | None, wake: int) -> bytes:
         if self._pieces:
             return self._pieces.popleft()

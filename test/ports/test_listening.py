@@ -175,8 +175,11 @@ def test_damaged_characters_of_either_port_are_damaged(ptys: list[Pty], wake: in
              for port in opened]  # a pty has no parity
     for pty in ptys:
         pair = listening.TwoPorts(ports[0], ports[1])
-        pty.write(b'\xFF\x00A')
-        assert isinstance(pair.read(5.0, wake), Damaged)
+        pty.write(b'a\xFF\x00Ab')
+        pieces = [pair.read(1.0, wake) for _ in range(3)]  # none waits for what comes next
+        assert pieces == [b'a', b'A', b'b']
+        assert isinstance(pieces[1], Damaged)
+        assert isinstance(pieces[2], SecondPort) is (pty is ptys[1])
     for port in ports:
         port.close()
 

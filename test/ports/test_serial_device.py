@@ -49,15 +49,6 @@ def test_port_that_cannot_be_opened(name: str, text: str) -> None:
     assert (caught.value.strerror or str(caught.value)) == text
 
 
-@pytest.mark.parametrize('name', ['spy://x', 'hwgrep://ttyUSB', 'loop://', 'foo://x'])
-def test_urls_that_pyserial_knows_are_files_that_do_not_exist(name: str, tmp_path: Path,
-                                                              monkeypatch: Any) -> None:
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(FileNotFoundError):
-        open_port(PortSettings(name))
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_port_that_another_program_has_asked_the_system_to_keep(
         monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*args: object) -> int:
