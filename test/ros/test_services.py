@@ -328,6 +328,7 @@ class StandIn:
         self.takes: list[Callable[[ReadAnswer], None]] = []
 
     def create_service(self, kind: type, name: str, answer: Any, **options: object) -> str:
+        assert name not in self.made
         self.made[name] = answer
         return name
 
