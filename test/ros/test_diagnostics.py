@@ -89,9 +89,9 @@ class Bench:
         self.results: list[DiagnosticStatus] = []
         self.tables = 0  # how often the Active Node Table has changed
         self.events = LineEvents(
-            get_logger('line_a'), PORT, stations_of(mappings), scans=True, seen=self.seen,
-            read=lambda mapping, values: None, results=self, table_changed=self._count,
-            clock=lambda: self.now)
+            get_logger('line_a'), PORT, stations_of(mappings), scans=mode != 'Peer',
+            seen=self.seen, read=lambda mapping, values: None, results=self,
+            table_changed=self._count, clock=lambda: self.now)
         self.driver = Driver(Network(mode=mode), mappings, DriverSettings(), self.events)
         self.link = LinkThread(self.driver.machine, lambda: pytest.fail('no port here'))
         self.diagnostics = Diagnostics('line_a', self.driver, PORT, self.events, left_out)
@@ -534,12 +534,15 @@ def test_station_that_answers_polls_and_no_command(bench: Bench) -> None:
     ('Peer', 0, '; it answers DLE NAK to all: is Error_Code right?'), ('Peer', 1, ''),
     ('Master', 0, '')])
 def test_full_duplex_plc_that_refuses_all_has_another_check(
-        mode: str, acks: int, why: str, make_bench: Benches) -> None:
+        mode: str, acks: int, why: str, make_bench: Benches,
+        capfd: pytest.CaptureFixture[str]) -> None:
     bench = make_bench('speed,Read,N7:0,1,PLC5,1000', mode=mode)
     bench.driver.counters.naks_received += 3
     bench.driver.counters.acks_received += acks
     bench.driver.stations.lost(1, NOW - 2)
     assert bench.says('station 1') == (ERROR, f'ERROR: station 1 inactive for 2.0 s{why}')
+    said = capfd.readouterr().err
+    assert '"plc detect"' in said and ('"plc scan"' in said) is (mode == 'Master')
 
 
 @pytest.mark.parametrize('counter', ['overdue', 'unanswered'])
@@ -964,10 +967,10 @@ def test_rows_whose_messages_fill_the_line_are_named_the_fullest_first() -> None
     spent = dict.fromkeys(rows, 0.0)
     line = FullLine(spent)
     assert line.text(100.0) == ''
-    spent[rows[0]], spent[rows[1]] = 1.0, 3.5
+    spent[rows[0]], spent[rows[1]] = 1.0, 2.75
     assert line.text(104.0) == ''  # it is not looked at all the time
     assert line.text(105.0) == (
-        'messages fill 90% of the line: w1 (70%), w0 (20%); set Write_Again to leave out '
+        'messages fill 75% of the line: w1 (55%), w0 (20%); set Write_Again to leave out '
         'unchanged values')
     spent[rows[1]] = 11.0
     assert line.text(120.0) == ''
