@@ -24,6 +24,7 @@ from abdf1_ros.ros.diagnostics.alarms import Alarms, AlarmStatus
 from abdf1_ros.ros.diagnostics.status import ERROR, OK, WARN
 from abdf1_ros.settings.network import Network
 import pytest
+from std_msgs.msg import UInt8MultiArray
 from support.mappings import cell_of, fault, one
 from support.ros import BridgeCell
 
@@ -117,7 +118,9 @@ def test_bridge_reports_the_alarm_of_a_plc(tmp_path: Path) -> None:
 
     with BridgeCell(tmp_path, data, rows, net) as cell:
         cell.diagnostics.until(lambda array: text_of(array) == 'OK: no alarm', 'no alarm')
+        door = cell.ros.listen(UInt8MultiArray, '/abdf1/read/door')
         cell.plcs.set('B3:0', 2)
+        door.values([1])  # an alarm is a value too
         cell.diagnostics.until(lambda array: re.fullmatch(
             r'ERROR: B3:0/1 for \d+\.\d s, 1 time', text_of(array)) is not None, 'the alarm')
         cell.diagnostics.clear()

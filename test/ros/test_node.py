@@ -225,6 +225,10 @@ def test_level_that_changes_is_published_at_once(
     bench = make_bench(PULSES, parameters=('snapshot_period:=0.0',))
     bench.node.link.stop()
     session, published, looks = bench.node.session, [], []
+    session.publish_diagnostics(7.0)
+    following = session.next_diagnostics
+    session.publish_diagnostics(following + 0.3)
+    assert 7.0 < following <= 8.0 and session.next_diagnostics == pytest.approx(following + 1.0)
     monkeypatch.setattr(session, 'publish_diagnostics', published.append)
     monkeypatch.setattr(bench.node.writes.standstills, 'look', looks.append)
     monkeypatch.setattr(bench.node.surroundings.snapshot, 'has_subscribers', pytest.fail)
