@@ -139,7 +139,6 @@ def _set_options(port: serial.Serial, settings: PortSettings, tell: Callable[[st
         try:
             port.rs485_mode = serial.rs485.RS485Settings()
         except (ValueError, OSError) as error:
-            port.rs485_mode = None
             tell(f'the port has no RS-485 mode: {error}')
 
 

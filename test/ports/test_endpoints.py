@@ -18,6 +18,7 @@ from contextlib import closing, suppress
 import os
 from pathlib import Path
 import socket
+import time
 
 from abdf1_ros.ports import endpoints
 from abdf1_ros.ports.descriptor import DescriptorPort, NoClient
@@ -137,8 +138,10 @@ def test_tcp_one_client_after_the_other(wake: int) -> None:
         scheme, _, address = line.name.partition('://')
         host, _, number = address.partition(':')
         assert (scheme, host) == ('socket', OWN_HOST)
+        begun = time.monotonic()
         with pytest.raises(NoClient):
             line.open()
+        assert time.monotonic() - begun >= 0.19  # it waits asleep
         for _ in range(2):
             with socket.create_connection((host, int(number)), PATIENCE) as client, \
                     closing(line.open()) as port:
