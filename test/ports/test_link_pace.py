@@ -263,14 +263,16 @@ def test_burst_beside_load_takes_the_time_of_the_line() -> None:
     assert port.now - 100.0 == pytest.approx(10 * READ_SIZE * 0.001)
 
 
-def test_commands_of_a_device_server_alone_are_rested_after_too() -> None:
-    script = Script(Listen(None), timing=LineTiming(0.001))
+@pytest.mark.parametrize(('char_time', 'pace'), [(0.001, 0.001), (0.0, 10 / 115200)])
+def test_commands_of_a_device_server_alone_are_rested_after_too(
+        char_time: float, pace: float) -> None:
+    script = Script(Listen(None), timing=LineTiming(char_time))
     port = Babbler(b'', 11)
     thread = Restful(script, port)
     port.worked = 1.0
     thread.run_out()
     assert thread.taken == []
-    assert thread.rests[0] == pytest.approx(0.001 * READ_SIZE)
+    assert thread.rests[0] == pytest.approx(pace * READ_SIZE)
 
 
 def test_connection_that_babbles_does_not_keep_a_request_from_the_machine() -> None:

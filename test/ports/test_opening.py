@@ -51,9 +51,11 @@ def made_up(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[PortSettings]]:
 
 
 def test_scheme_is_a_file_and_a_word(made_up: list[PortSettings]) -> None:
-    settings = PortSettings.of(network.make_network({'com_port': ('pigeon://loft:7', 'test')}))
-    open_port(settings).close()
-    assert made_up == [settings]
+    cells = {'com_port': 'pigeon://loft:7', 'baud': '19200', 'data_bits': '7', 'parity': 'Even',
+             'stop_bits': '2', 'handshake': 'Yes'}
+    open_port(PortSettings.of(network.make_network(
+        {name: (cell, 'test') for name, cell in cells.items()}))).close()
+    assert made_up == [PortSettings('pigeon://loft:7', 19200, 7, 'Even', 2, handshake=True)]
 
 
 @pytest.mark.parametrize('name', ['loop://', 'pigeon://loft:7'])  # pyserial knows the first
