@@ -144,15 +144,15 @@ def test_client_that_is_thrown_out_again_and_again_is_told_of_the_other_one(
     server = NewestClientServer()
     url = 'socket://{}:{}'.format(*server.address)
     said = []
-    for seconds in (10.0, 10.0, 10.0, 10.0, 0.0):  # the last three ends are further apart
-        monkeypatch.setattr(socket_port, 'ENDS_PERIOD', seconds)
+    moments = Mock(side_effect=[0.0, 1.0, 2.0, 11.0, 13.0, 14.0, 15.0])  # of all ends
+    monkeypatch.setattr(socket_port, 'time', Mock(monotonic=moments))
+    for _ in range(5):
         port = open_port(PortSettings(url))
         assert port.read(PATIENCE, port.fileno()) == b'!'  # type: ignore[attr-defined]
         with socket.create_connection(server.address), pytest.raises(OSError) as caught:
             port.read(PATIENCE, port.fileno())  # type: ignore[attr-defined]
         port.close()
         said.append(str(caught.value))
-    monkeypatch.setattr(socket_port, 'ENDS_PERIOD', 10.0)
     port = open_port(PortSettings(url))
     monkeypatch.setattr('os.write', Mock(side_effect=BrokenPipeError(EPIPE, 'Broken pipe')))
     with pytest.raises(OSError, match='Broken pipe, 3 times within 10 s: another client'):
