@@ -913,6 +913,7 @@ def test_last_fallback_value_of_a_station_is_told_with_its_cause(make_bench: Ben
     assert bench.seen.last_fallbacks == {1: ('speed: timeout', NOW)}
 
     class Another(str):  # what the thread of the link does at this moment
+
         def __format__(self, kind: str) -> str:
             bench.seen.last_fallbacks[2] = self, NOW
             return str(self)
