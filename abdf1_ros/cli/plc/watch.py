@@ -41,7 +41,7 @@ from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.wake import Wake
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
-from abdf1_ros.text import bar, BARS, cut, printable
+from abdf1_ros.text import bar, BARS, counted, cut, printable
 
 # Period (ms) to show ages and errors again without new values.
 _GLANCE = 250
@@ -175,7 +175,7 @@ class LiveValues:
         is_live = is_terminal(sys.stdout) and not self._csv
         if (lost := self._lost - self._lost_reported) and not is_live:
             self._lost_reported += lost
-            tell('plc', f'{lost} reads were lost: this output was too slow for them')
+            tell('plc', f'{counted(lost, "read")} lost: this output was too slow for them')
         for mapping in self._mappings:
             error = self._driver.points[mapping].error
             if error is not None:
@@ -222,7 +222,7 @@ class LiveValues:
             self._shown[mapping] = what
             if isinstance(what, NoValue):
                 # one gap per silence, so that the curve keeps the values before it
-                if before != what:
+                if not isinstance(before, NoValue):
                     self._past[mapping].append(math.nan)
             elif mapping.length == 1 and not isinstance(what, str):
                 self._past[mapping].append(what[0])

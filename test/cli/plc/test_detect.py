@@ -41,7 +41,7 @@ from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 import pytest
 from support.driver_bench import simulated_plc
-from support.odd_device import OddDevice, Wiring
+from support.odd_device import Answer, OddDevice, Wiring
 from support.plc_line import LosesPolls, machine_line, odd_line, plc_line
 from support.ptys import Pty
 
@@ -258,6 +258,7 @@ def test_characters_of_before_an_echo_was_seen_are_no_trace(
 
         def __init__(self, network: Network, absent: object = ()) -> None:
             self.echoes = network.baud == 19200
+            assert network.cmd_timeout == 500  # also where Timeout is short
             self.counters.chars_received = 4
 
         def __enter__(self) -> 'EchoedSession':
@@ -269,7 +270,7 @@ def test_characters_of_before_an_echo_was_seen_are_no_trace(
     absent = Presence(1, 0.0, None, None, is_there=False, takes_commands=False)
     monkeypatch.setattr(detect, 'Session', EchoedSession)
     monkeypatch.setattr(detect, 'look_at', lambda session, station: absent)
-    search = Search(Network(), [1])
+    search = Search(Network(timeout=100), [1])
     assert search.run([9600]) is None
     assert len(search.traces) == 3
     assert search.run([9600, 19200]) is None
@@ -328,10 +329,12 @@ def test_gateway_in_full_duplex_proves_the_settings_though_no_node_is_asked_that
 @pytest.mark.usefixtures('half_duplex_only')
 def test_plc_on_the_line_goes_before_a_gateway(tmp_path: Path) -> None:
     device = gateway_of(Wiring.HALF)
-    device.stations = device.nodes = frozenset((8, 11))  # 11 is a slave of its own
+    device.stations = device.nodes = frozenset((8, 11, 12))  # 11 and 12 are slaves of their own
+    device.takes = lambda data: Answer.NOTHING if data[0] == 12 else Answer.ACK
     with odd_line(tmp_path / 'line', device) as name:
-        found = Search(Network(com_port=name, timeout=1000), [8, 11]).run([19200])
-    assert found is not None and found.presence.station == 11
+        for stations, best in (([8, 11], 11), ([8, 12], 8)):
+            found = Search(Network(com_port=name, timeout=1000), stations).run([19200])
+            assert found is not None and found.presence.station == best
 
 
 def test_nodes_that_are_stations_of_the_line_are_found_without_via(

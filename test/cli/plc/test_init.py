@@ -15,6 +15,7 @@
 """First files of a line, the data files of a PLC, and the ports of this machine."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 import time
 
@@ -29,7 +30,7 @@ from abdf1_ros.cli.plc.verbs import ports as ports_verb
 from abdf1_ros.pccc import gateways
 from abdf1_ros.pccc.file_search import DataFile
 from abdf1_ros.pccc.file_types import FileType, PlcType
-from abdf1_ros.pccc.identity import Identity
+from abdf1_ros.pccc.identity import Identity, Mode
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.ports.listing import SerialPortInfo
 from abdf1_ros.problems import ConfigurationError
@@ -73,22 +74,7 @@ def test_init_writes_files_that_the_node_takes(port: str, tmp_path: Path, capsys
     assert problems == []
     assert [(mapping.tag, mapping.plc_type.value, mapping.station) for mapping in mappings] == [
         ('status_1', 'PLC5', 1), ('status_2', 'SLC', 2)]
-
-
-def test_full_disk_leaves_no_file(tmp_path: Path) -> None:
-    files = NewFiles(tmp_path / 'new', 'net.csv', 'map.csv')
-    with no_file_longer_than(10), pytest.raises(ConfigurationError,
-                                                match='map.csv: cannot be written: File too'):
-        files.write('short', 'too long for it')
-    assert not any(path.exists() for path in files.paths)
-
-
-@pytest.mark.usefixtures('half_duplex_only')
-def test_rows_that_are_only_comments_are_good_rows_too(
-        port: str, tmp_path: Path, capsys: Output) -> None:
-    assert main(['init', '--port', port, '--into', str(tmp_path), '--baud', '19200',
-                 '--stations', '1,2', *PATIENT]) == 0
-    capsys.readouterr()
+    # The rows that are comments are good rows, too.
     path = tmp_path / 'map.csv'
     rows = [line.removeprefix('# ') if line.count(',') == 10 else line
             for line in path.read_text(encoding='utf-8').splitlines()]
@@ -102,20 +88,35 @@ def test_rows_that_are_only_comments_are_good_rows_too(
     assert guarded == ['interlocks_1', 'interlocks_2']
 
 
+def test_full_disk_leaves_no_file(tmp_path: Path) -> None:
+    files = NewFiles(tmp_path / 'new', 'net.csv', 'map.csv')
+    with no_file_longer_than(10), pytest.raises(ConfigurationError,
+                                                match='map.csv: cannot be written: File too'):
+        files.write('short', 'too long for it')
+    assert not any(path.exists() for path in files.paths)
+
+
 def test_plc_of_an_unknown_family_leaves_no_later_one_out() -> None:
     unknown = Identity(None, 'type 0x77')
     known = Identity(PlcType.SLC, 'SLC 5/03')
-    rows = ''.join(map_rows([Presence(number, 0.1, identity, None, True, True)
-                             for number, identity in ((1, unknown), (2, known))], {}))
+    stopped = replace(known, mode=Mode.PROGRAM)
+    rows = ''.join(map_rows([Presence(number, 0.1, identity, None, True, True) for number, identity
+                             in enumerate((unknown, known, stopped), 1)], {}))
     assert '# words_1,' in rows and '\nstatus_2,Read,S:0,2,SLC,' in rows
-    assert ',8,250,,,\n' in rows  # a PLC that does not tell its mode is not guarded by it
+    # a PLC that does not tell its mode is not guarded by it
+    assert [f'0/0,{number},SLC,,8,250,{guard},,\n' in rows
+            for number, guard in ((2, ''), (3, 'RUN'))] == [True, True]
 
 
 def test_gateway_leads_to_the_nodes_behind_it() -> None:
     gateway = gateways.decode(bytes.fromhex('00 FE 19 00 00 00 10 00 20 00'))
-    rows = ''.join(map_rows([Presence(8, 0.0, gateway, None, True, True)], {}))
-    assert 'plc scan 0-63 --via 8 --net net.csv' in rows
-    assert 'words_8' not in rows
+    there = [Presence(number, 0.0, identity, None, True, True)
+             for number, identity in ((8, gateway), (9, None))]
+    for mode, scan, via in (
+            ('Master', '0-63 --via 8', 'Via 8'), ('Radio', '0-63', 'an empty Via')):
+        rows = ''.join(map_rows(there, {}, mode))
+        assert f'plc scan {scan} --net net.csv' in rows and f' have {via} and' in rows
+        assert 'words_8' not in rows and 'words_9' in rows
 
 
 @pytest.mark.parametrize(('wiring', 'options', 'scan'), [

@@ -105,6 +105,7 @@ def test_time_of_an_answer_begins_when_the_line_takes_commands(
         monkeypatch: pytest.MonkeyPatch) -> None:
     class Slow:
         now = 0.0
+        network = Network()
 
         def settle(self) -> None:
             self.now += 0.1
@@ -112,9 +113,13 @@ def test_time_of_an_answer_begins_when_the_line_takes_commands(
         def ask(self, station: int, work: object) -> None:
             self.now += 0.01
 
+        def attempt(self, station: int, work: object) -> tuple[None, FormatError]:
+            return self.ask(station, work), FormatError('')
+
     session = Slow()
     monkeypatch.setattr(presence, 'time', SimpleNamespace(monotonic=lambda: session.now))
     assert presence.ping(cast(Session, session), 1) == pytest.approx(0.01)
+    assert look_at(cast(Session, session), 1).seconds == pytest.approx(0.01)
 
 
 def test_scan_behind_a_gateway_finds_only_who_is_there(tmp_path: Path) -> None:
@@ -181,9 +186,11 @@ def test_scan_in_full_duplex_does_not_count_what_a_gateway_refuses(tmp_path: Pat
 def test_scan_asks_silent_stations_again(tmp_path: Path) -> None:
     plcs = [simulated_plc(1, 'SLC', time.monotonic), simulated_plc(2, 'SLC', time.monotonic)]
     with plc_line(tmp_path / 'line', *plcs, around=lambda port: LosesPolls(port, {2})) as name:
-        found = list(scan(Network(com_port=name, timeout=1000), [1, 2]))
+        shown: list[str] = []
+        found = list(scan(Network(com_port=name, timeout=1000), [1, 2], show=shown.append))
     assert [(there.station, there.is_there, there.asked) for there in found] == [
         (1, True, 1), (2, True, 2)]
+    assert shown == ['station 1 of 2', 'station 2 of 2', 'station 1 of 1, asked 2 times']
 
 
 class Damages(PortAround):

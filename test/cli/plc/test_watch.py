@@ -98,7 +98,7 @@ def test_what_stays_is_shown_once(plcs: Plcs, capsys: Output) -> None:
 
 # Each on a line of its own: after a watch that ends with a command under way its reply may come.
 @pytest.mark.parametrize(('tags', 'title', 'first', 'other'), [
-    (None, '', '', ''), ({'N7:0': 'a, b'}, 'tag,', '"a, b",', '"",')])
+    (None, '', '', ''), ({}, 'tag,', '"",', '"",'), ({'N7:0': 'a, b'}, 'tag,', '"a, b",', '"",')])
 def test_each_read_is_a_line_of_csv_for_each_value(
         plcs: Plcs, capsys: Output, tags: Tags | None, title: str, first: str, other: str) -> None:
     store(plcs[1], 'ST9:0', 'a,"b"')
@@ -121,9 +121,14 @@ def test_reads_that_the_output_does_not_take_are_counted_and_others_keep_their_t
     shown = datetime.now()
     watch.show()
     said, told = capsys.readouterr()
-    assert told == 'plc: 3 reads were lost: this output was too slow for them\n'
+    assert told == 'plc: 3 reads lost: this output was too slow for them\n'
     watch.show()
     assert capsys.readouterr() == ('', '')
+    for lost in (1, 2):  # since the last call each
+        for value in range(lost + 2):
+            watch.read(SPEED, array('h', [value]))
+        watch.show()
+        assert capsys.readouterr().err.startswith(f'plc: {lost} read{"s"[:lost - 1]} lost: ')
     times, values = zip(*((line.split(',')[0], line.split(',')[-1])
                           for line in said.splitlines()), strict=True)
     assert (values, {len(time) for time in times}) == (('3', '4'), {23})  # with milliseconds
@@ -132,9 +137,13 @@ def test_reads_that_the_output_does_not_take_are_counted_and_others_keep_their_t
 
 def test_read_that_fails_is_a_line_of_csv_without_a_value(plcs: Plcs, capsys: Output) -> None:
     plcs.say('silent 1')
-    assert LiveValues(network_on(plcs, 100), [SPEED], 0.01, csv=True).run(2) == 1
+    watch = LiveValues(network_on(plcs, 100), [SPEED], 0.01, csv=True)
+    assert watch.run(2) == 1
+    for value in (7, 8):  # it answers for a moment
+        watch.read(SPEED, array('h', [value]))
+        watch.show()
     assert [line.partition(',')[2] for line in capsys.readouterr().out.splitlines()[1:]] == [
-        '1,N7:0,']
+        f'1,N7:0,{value}' for value in ('', 7, '', 8, '')]
 
 
 def test_control_characters_of_a_plc_do_not_reach_the_screen(plcs: Plcs, capsys: Output) -> None:
@@ -241,8 +250,10 @@ def test_nothing_old_stays_below_a_table_that_shrinks(
 
     watch = LiveValues(Network(), rows, 0.01)
     fault = NoValue('2509 ERR_INACTIVE_STATION: Slave Station (1) Inactive')
-    assert len(show((60, 9), *((row, fault) for row in rows))) > 4
-    healed = show((60, 9), *((row, array('h', [5])) for row in rows))
+    assert show((60, 5), *((row, fault) for row in rows))[2:] == [
+        'N7:0 1 int16 no value: 2509', 'ERR_INACTIVE_STATION:',
+        '+6 more; a higher window shows them']
+    healed = show((60, 5), *((row, array('h', [5])) for row in rows))
     assert healed[1:] == [
         'address station type age s value', 'N7:0 1 int16 * 5', 'C5:0.ACC 1 int16 * 5']
     # What a narrower window did with the lines before is not known: it begins at its top.
@@ -257,7 +268,7 @@ def test_nothing_old_stays_below_a_table_that_shrinks(
 def test_table_marks_changes_and_says_what_does_not_fit(draw: Draw) -> None:
     words = make_mapping('N7:0', length=4), make_mapping('N7:9', item=2), SPEED
     news = [(words[0], array('h', [1, 2, 3, 4])), (words[0], array('h', [-200, 2, 3, 4])),
-            *2 * [(words[1], array('h', [5]))]]
+            *((words[1], array('h', [5])) for _ in range(2))]
     _, *lines = draw(words, *news, size=(52, 6))
     assert lines == ['N7:0           1  int16         *  -200     2     3',
                      'N7:3                                  4',
@@ -288,7 +299,7 @@ def test_description_stands_where_there_is_room(draw: Draw) -> None:
 def test_number_has_a_curve_where_it_fits_and_can_be_shown(draw: Draw) -> None:
     news = [(SPEED, array('h', [value])) for value in (9, *range(1, 25), 12)]
     silence = (SPEED, NoValue('silent'))
-    news = [*news[:-1], silence, silence, news[-1]]
+    news = [*news[:-1], silence, (SPEED, NoValue('lost')), news[-1]]
     head, line = draw([SPEED], *news, size=(75, 9))
     assert head.endswith('value, and its last 24 reads')
     assert line.endswith('*  12        3 ▁▁▂▂▂▃▃▃▄▄▄▅▅▅▆▆▆▇▇▇██ ▄ 24')
@@ -333,11 +344,12 @@ def test_mode_of_each_plc_and_faults_of_the_line_stand_around_the_values(
                        faults=() if mode is Mode.RUN else ('memory lost',),
                        mode_text=mode.value if mode else 'mode 0x0E')
     monkeypatch.setattr(Checks, 'known', lambda self, station: StationHealth(
-        str(stopped), stopped))
+        str(stopped), stopped if station else None))
     lines = draw([SPEED, NAME], (SPEED, array('h', [5])), (NAME, 'Tank'))
     assert lines[0] == f'station 1: PLC-5/40, {text}'
     assert lines[1].startswith('address') and len(lines) == 4
-    assert draw([SPEED, NAME], size=(100, 2)) == lines[:1]
+    other = make_mapping('N7:0', station=0, item=3)  # of a PLC that has not told its mode yet
+    assert draw([other, SPEED, NAME], size=(100, 2)) == lines[:1]
     monkeypatch.setattr(LiveValues, 'faults_of_line', lambda self: ['line: 3 repeated, 1 damaged'])
     assert draw([SPEED], (SPEED, array('h', [5])))[-1] == 'line: 3 repeated, 1 damaged'
 
