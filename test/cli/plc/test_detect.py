@@ -27,7 +27,7 @@ from abdf1_ros.cli.plc import detect
 from abdf1_ros.cli.plc.command import main
 from abdf1_ros.cli.plc.detect import BAUD_RATES, LineSettings, Search
 from abdf1_ros.cli.plc.init import net_csv
-from abdf1_ros.cli.plc.presence import Presence
+from abdf1_ros.cli.plc.presence import Presence, scan
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import ACK, Duplex, Frame
@@ -355,3 +355,7 @@ def test_gateway_in_full_duplex_that_answers_diagnostics_for_all_has_the_nodes_t
     assert 'station 1 not reached, a gateway answers for it: STS 02' in said
     assert '1 of 64 stations answer' in said
     assert 'the gateway answers for this station, as 1785-KE' in said.partition('      9 ')[2]
+    device.wiring = Wiring.RADIO
+    with odd_line(tmp_path / 'radio', device) as name:
+        found = scan(Network(com_port=name, mode='Radio', cmd_timeout=2000), [1, 9])
+        assert [seen.is_there for seen in found] == [False, True]

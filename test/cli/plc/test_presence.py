@@ -22,7 +22,15 @@ from typing import cast
 
 from abdf1_ros.cli.plc import presence
 from abdf1_ros.cli.plc.command import main
-from abdf1_ros.cli.plc.presence import describe, hint, look_at, Presence, scan, type_to_say
+from abdf1_ros.cli.plc.presence import (
+    describe,
+    hint,
+    io_access,
+    look_at,
+    Presence,
+    scan,
+    type_to_say,
+)
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import FormatError, StationInactive
@@ -64,6 +72,16 @@ def test_next_step_for_a_plc_of_an_unknown_family_names_one(
     assert type_to_say(Presence(2, 0.1, identity, None, True, True)) == option
 
 
+@pytest.mark.parametrize(('slot', 'ways'), [(0, ['Slot', 'Flat']), (7, ['Slot', 'Flat']),
+                                            (8, ['Flat'])])
+def test_inputs_are_looked_for_in_the_first_slots(
+        tmp_path: Path, slot: int, ways: list[str]) -> None:
+    plc = simulated_plc(1, 'SLC', time.monotonic, (f'I:{slot}.0', 2))
+    with plc_line(tmp_path / 'line', plc) as name, Session(
+            Network(com_port=name, timeout=2000)) as session:
+        assert io_access(session, look_at(session, 1)) == ways
+
+
 @pytest.mark.parametrize('mode', ['Master', 'Peer'])
 def test_silence_and_noise(tmp_path: Path, mode: str) -> None:
     line = Pty(tmp_path / 'line')
@@ -71,6 +89,8 @@ def test_silence_and_noise(tmp_path: Path, mode: str) -> None:
     with Session(network, absent=[1]) as session:
         seen = look_at(session, 1)
         assert isinstance(seen.error, StationInactive)
+        sent = session.counters
+        assert (sent.enq_retries, sent.commands_sent) == (0, mode == 'Peer')
         assert not seen.is_there
         assert not seen.takes_commands
         duplex = 'full' if mode == 'Peer' else 'half'

@@ -24,7 +24,7 @@ from abdf1_ros.cli.plc.targets import to_read
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.network import Network
 import pytest
-from support.commands import call, Output, PATIENT, Plc, running_simulator
+from support.commands import call, FAST, Output, PATIENT, Plc, running_simulator
 from support.ptys import Pty, wait_until
 from support.ros import Process, write_csv
 from support.simulator_process import Files
@@ -226,8 +226,10 @@ def test_read_goes_on_after_a_refusal(plc: Plc, tmp_path: Path) -> None:
     said = plc('read', 'N99:0', 'N98:0')
     assert said.err.count('of station 1: STS F0') == 2 and said.err.count('"plc files 1"') == 1
     path = write_csv(tmp_path / 'map.csv', 'Tag,Command,Address,Station,PLC_Type',
-                     ['near,Read,N7:0,1,PLC5', 'far,Read,N99:0,2,SLC'])
-    assert plc('read', '--map', str(path)).err.startswith('plc: far (N99:0) of station 2: STS ')
+                     ['gone,Read,N7:0,9,PLC5', 'far,Read,N99:0,2,SLC'])
+    said = plc('read', 'far', '--map', str(path))
+    assert said.err.startswith('plc: far (N99:0) of station 2: STS ')
+    assert plc('read', '--map', str(path), *FAST).err.splitlines()[-1].startswith('plc: sent: ')
 
 
 def test_read_in_another_radix(plc: Plc) -> None:
