@@ -75,6 +75,7 @@ from abdf1_ros.sniffer.pcapng import PcapngWriter
 from abdf1_ros.sniffer.report import json_line, summary_json, summary_lines, text_line
 from abdf1_ros.sniffer.summary import Summary
 from abdf1_ros.sniffer.traffic import TrafficDecoder
+from abdf1_ros.text import counted
 
 if TYPE_CHECKING:
     from abdf1_ros.cli.sniff_picture import Timeline
@@ -417,7 +418,7 @@ def _print_heard(tap: Tap, trace: Trace | None, output: Output, settings: dict[s
 def _tell_lost(tap: Tap, trace: Trace | None) -> None:
     """Report the pieces that were lost since the last call."""
     if lost := tap.new_losses():
-        text = f'{lost} pieces of traffic were lost: this output was too slow for them'
+        text = f'{counted(lost, "piece")} of traffic lost: this output was too slow'
         _say(text)
         if trace:
             trace.write(f'# {text}')

@@ -43,7 +43,7 @@ _STATUS_REQUEST = 0x06, b'\x03'  # CMD, and FNC as the first byte of its data
 
 # A bundle must be small enough for mail: of a long recording it has only the first entries as
 # text. The capture has all entries.
-_MOST_ENTRIES = 100_000
+MOST_ENTRIES = 100_000
 
 # The mark that identifies a bundle.
 _COMMENT = b'abdf1_ros sniff --report'
@@ -82,7 +82,7 @@ class ReportBundle:
 
     def add(self, entry: Entry) -> None:
         """Add an entry."""
-        if len(self._entries) < _MOST_ENTRIES:
+        if len(self._entries) < MOST_ENTRIES:
             self._entries.append(entry)
         reply, request = entry.packet, entry.request
         if reply and request and (request.cmd, request.data) == _STATUS_REQUEST:

@@ -73,6 +73,8 @@ def test_demo_stays_on_this_machine(monkeypatch: pytest.MonkeyPatch) -> None:
     assert demo.main([]) == 0
     assert os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'LOCALHOST'
     assert os.environ['ROS_DOMAIN_ID'] != ours  # nobody else's
+    monkeypatch.setenv('ROS_DOMAIN_ID', ours)
+    assert (demo.main([]), os.environ['ROS_DOMAIN_ID']) == (0, ours)  # as the user has said
 
 
 def test_bridge_and_folder_end_with_a_demo_that_is_killed(
@@ -95,12 +97,13 @@ def test_bridge_and_folder_end_with_a_demo_that_is_killed(
 
 
 class Told:
-    """Stands in for a demo that stops in step 3 of 7."""
+    """Stands in for a demo of 7 steps that stops."""
 
-    step, last_step, is_told = 3, 7, False
+    last_step, is_told = 7, False
 
     def __init__(self, end: BaseException | None) -> None:
         self._end = end
+        self.step = 7 if isinstance(end, KeyboardInterrupt) else 3  # also in the last step
 
     def run(self, seconds: float) -> None:
         """End as told."""
@@ -115,7 +118,7 @@ class Told:
 
 @for_all(('end', 'status', 'text'), [
     (None, 0, 'demo: all 7 steps were seen as they should be'),
-    (KeyboardInterrupt(), 0, 'demo: interrupted in step 3 of 7'),
+    (KeyboardInterrupt(), 0, 'demo: interrupted in step 7 of 7'),
     (demo.Missed('waited 30 s for values, which did not come'), 1,
      'demo: step 3 of 7 was not seen as it should be: waited 30 s for values, which did '
      'not come')])

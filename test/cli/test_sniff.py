@@ -168,6 +168,12 @@ def test_progress_has_a_percentage_where_the_size_is_known(
         told = capsys.readouterr().err.splitlines()
         assert len(told) == count
     assert told[-1] == f'sniff: {capture}: 100 %, 45 bytes so far'
+    output = sniff.Output(sniff.parse(['--summary', capture]))
+    monkeypatch.setattr(sniff, 'PROGRESS_PERIOD', 9.0)
+    for done in 'ab':
+        output.show_progress(done)
+    assert capsys.readouterr().err == 'sniff: a, 0 bytes so far\n'
+    monkeypatch.setattr(sniff, 'PROGRESS_PERIOD', 0.0)
     assert main(['--summary', '--binary', '--seconds', '0.2', '/dev/zero']) == 0
     assert re.match('sniff: /dev/zero, [0-9]+ bytes so far\n', capsys.readouterr().err)
 
@@ -226,6 +232,11 @@ def test_packets_go_nowhere_else_than_into_pcapng(capsys: Output, capture: str) 
     with no_file_longer_than(200):
         assert main(['--pcapng', f'{capture}.pcapng', capture]) == 2
     assert 'File too large; no more packets are written\n' in capsys.readouterr().err
+    with open(capture, 'a', encoding='ascii') as file:
+        file.write('0.05 > 10 02 31\n')  # broken off: it is told at the end
+    whole = f'{capture}.whole'
+    assert lines_of(capsys, '--pcapng', whole, capture)[5].endswith('DLE ETX')
+    assert len([*PacketFile(whole, BytesIO(Path(whole).read_bytes())).packets()]) == 6
 
 
 @for_all('args', [
@@ -337,22 +348,27 @@ def test_signal_ends_it_while_its_output_is_not_taken(
 
 def test_lost_port_ends_with_the_summary(tmp_path: Path) -> None:
     pty = Pty(tmp_path / 'line')
-    with Process('sniff', '--port', str(pty.name)) as sniff:
+    saved = tmp_path / 'saved'
+    with Process('sniff', '--port', str(pty.name), '--save', str(saved)) as sniff:
         sniff.wait_for('sniff: ')
+        pty.write(SAID[1])
+        sniff.wait_for('? ')
         pty.close()
         assert sniff.result() == 1
+    assert saved.read_text('ascii').endswith(' ? 10 06\n')
     assert _told(sniff)[1].startswith('sniff: a port was lost: ')
-    assert _printed(sniff)[0].startswith('summary: ')
+    assert _printed(sniff)[1].startswith('summary: ')
 
 
 def test_what_a_slow_output_has_lost_is_told_and_saved(
         tmp_path: Path, capsys: Output, monkeypatch: pytest.MonkeyPatch) -> None:
-    tap = MagicMock(names=['x'], new_losses=Mock(side_effect=[0, 3]), chunks=lambda *args: iter(
+    tap = MagicMock(names=['x'], new_losses=Mock(side_effect=[1, 3]), chunks=lambda *args: iter(
         Chunk(time, Direction.UNKNOWN, frames.poll_frame(2)) for time in (0.0, 0.1)))
     monkeypatch.setattr(sniff, 'Tap', made := Mock(return_value=tap))
     assert main(['--tap', 'x', 'pty', '--parity', 'Even', '--save', str(tmp_path / 'saved')]) == 0
-    told = '3 pieces of traffic were lost: this output was too slow for them\n'
-    assert capsys.readouterr().err.endswith(told)
+    first, told = (f'{lost} of traffic lost: this output was too slow\n'
+                   for lost in ('1 piece', '3 pieces'))
+    assert capsys.readouterr().err.endswith(f'sniff: {first}sniff: {told}')
     assert (tmp_path / 'saved').read_text('ascii').endswith(told)
     assert made.call_args.args[1].parity == 'Even'
     assert '# baud: 9600\n' in (tmp_path / 'saved').read_text('ascii')
@@ -362,6 +378,11 @@ def test_what_a_slow_output_has_lost_is_told_and_saved(
     assert 'baud' not in (tmp_path / 'of_pty').read_text('ascii')
     assert main(['--port', 'x', '--baud', '19200']) == 0
     assert made.call_args.args[1].baud == 19200
+    monkeypatch.setattr(sniff, 'PROGRESS_PERIOD', 0.0)
+    monkeypatch.setattr(sys.stderr, 'isatty', lambda: True)
+    capsys.readouterr()
+    assert main(['--port', 'x', '--summary']) == 0  # also while the line is never idle
+    assert re.findall('listening, ([0-9]+) bytes', capsys.readouterr().err) == ['4', '8']
 
 
 def test_colour_is_for_terminals_only(
@@ -403,12 +424,14 @@ def test_full_disk_does_not_cut_a_tap(tmp_path: Path) -> None:
     assert saved.endswith('\n') and len([*read_capture('saved', saved.splitlines(), {})]) > 5
 
 
-@pytest.mark.parametrize(('way', 'goes_on'), [('--tap', True), ('--port', False)])
-def test_reader_that_leaves_does_not_cut_a_tap(tmp_path: Path, way: str, goes_on: bool) -> None:
+@pytest.mark.parametrize(('way', 'goes_on', 'is_saved'), [
+    ('--tap', True, True), ('--tap', True, False), ('--port', False, True)])
+def test_reader_that_leaves_does_not_cut_a_tap(
+        tmp_path: Path, way: str, goes_on: bool, is_saved: bool) -> None:
     names = [str(tmp_path / name) for name in 'ab']
     saved = tmp_path / 'saved'
     sniff = Forked('sniff', [way, *[f'pty:{name}' for name in names[:1 + goes_on]],
-                             '--save', str(saved)])
+                             *['--save', str(saved)] * is_saved])
     sniff.stderr.readline()
     sniff.stdout.close()
     near, far = (os.open(name, os.O_RDWR | os.O_NOCTTY) for name in (names[0], names[goes_on]))
@@ -422,6 +445,8 @@ def test_reader_that_leaves_does_not_cut_a_tap(tmp_path: Path, way: str, goes_on
     else:
         os.write(near, SAID[0] + SAID[1])
     assert sniff.wait(PATIENCE) == 0
+    if not is_saved:
+        return
     chunks = read_capture('saved', saved.read_text(encoding='ascii').splitlines(), {})
     assert b''.join(chunk.data for chunk in chunks) == (1 + 2 * goes_on) * (SAID[0] + SAID[1])
 

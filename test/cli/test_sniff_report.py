@@ -18,6 +18,7 @@ import json
 from pathlib import Path
 from zipfile import ZipFile
 
+from abdf1_ros.cli import sniff_report
 from abdf1_ros.cli.sniff import main
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
@@ -64,7 +65,9 @@ def bundle_of(tmp_path: Path, capture: str, *options: str) -> dict[str, str]:
 
 def test_bundle_has_all_that_a_report_needs(
         tmp_path: Path, capture: str, capsys: pytest.CaptureFixture[str]) -> None:
-    files = bundle_of(tmp_path, capture)
+    page = tmp_path / 'line.html'
+    files = bundle_of(tmp_path, capture, '--html', str(page))
+    assert 'TNS 1234' in page.read_text('utf-8')
     assert set(files) == {
         'README.txt', 'summary.txt', 'summary.json', 'processors.txt', 'versions.json',
         'entries.txt', 'capture/line.cap', 'settings/map.csv', 'conformance/slave.json'}
@@ -123,7 +126,7 @@ def test_anonymous_bundle_has_no_name_of_a_host_user_path_or_port(
         tmp_path: Path, capture: str) -> None:
     folder = tmp_path / 'home' / 'jdoe'
     folder.mkdir(parents=True)
-    files = {'acme_net.csv': NET, 'net2.csv': NET.replace('rfc2217://plc-gw', '/dev/plc-gw'),
+    files = {'acme_net.csv': NET, 'net2.csv': NET.replace('rfc2217://', 'jdoe://'),
              'booth_map.csv': MAP, 'map2.csv': MAP.replace(',', ';'),
              'plc-gw.txt': 'Port of jdoe\n',
              'export.csv': 'Tag Name,Address,Client Access\njdoe,,\n',
@@ -163,12 +166,15 @@ def test_anonymous_bundle_has_no_name_of_a_host_user_path_or_port(
     assert found['conformance/1_result.json'].startswith('left out: ')
 
 
-def test_processor_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_processor_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str],
+                            monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / 'status.cap'
     lines = ['# abdf1_ros capture 1', '# check: CRC', '# duplex: full']
     said = [*pair('diag_status_slc504')]
     said.append(said[0]._replace(dst=9, tns=said[0].tns + 1))
     said.append(said[2].reply(b'')._replace(sts=0x10))
+    said.append(said[0]._replace(tns=said[0].tns + 2))
+    said.append(said[4].reply(b'')._replace(sts=0x10))
     lines += [f'{count}.0 {"><"[count % 2]} '
               f'{frames.message_frame(packet.encode(), Checksum.CRC).hex()}'
               for count, packet in enumerate(said)]
@@ -182,6 +188,11 @@ def test_processor_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     assert main([str(path), '--summary', '--report', str(report), '--anonymous']) == 0
     with ZipFile(report) as bundle:
         assert 'status ' not in bundle.read('processors.txt').decode()
+    monkeypatch.setattr(sniff_report, 'MOST_ENTRIES', 1)
+    assert main([str(path), '--summary', '--report', str(report)]) == 0
+    with ZipFile(report) as bundle:
+        assert bundle.read('processors.txt').decode() == text
+        assert len(bundle.read('entries.txt').splitlines()) == 1
     capsys.readouterr()
 
 
@@ -218,9 +229,11 @@ def test_files_of_one_name_are_all_in_the_bundle(tmp_path: Path, capture: str) -
         (tmp_path / folder).mkdir()
         names.append(str(tmp_path / folder / 'net.csv'))
         Path(names[-1]).write_text(f'Station\n{len(names)}\n', encoding='utf-8')
-    report = str(tmp_path / 'report.zip')
-    assert main([capture, '--summary', '--report', report, '--settings', *names]) == 0
+    report, other = str(tmp_path / 'report.zip'), tmp_path / 'one' / 'line.cap'
+    other.write_text('1.0 > 10 05\n', encoding='ascii')
+    assert main([capture, str(other), '--summary', '--report', report, '--settings', *names]) == 0
     with ZipFile(report) as bundle:
+        assert bundle.read('capture/1_line.cap') == other.read_bytes()
         assert [bundle.read(f'settings/{name}')[:9] for name in (
             'net.csv', '1_net.csv', '2_net.csv')] == [b'Station\n1', b'Station\n2', b'Station\n3']
 

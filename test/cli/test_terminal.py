@@ -22,6 +22,7 @@ import os
 from pathlib import Path
 import signal
 import sys
+from unittest.mock import Mock
 
 from abdf1_ros.cli import terminal
 from abdf1_ros.cli.terminal import (
@@ -29,6 +30,7 @@ from abdf1_ros.cli.terminal import (
     colour,
     command_parser,
     interruptible,
+    is_port,
     is_terminal,
     is_wanted,
     may_replace,
@@ -88,12 +90,23 @@ def test_question_without_a_terminal_is_only_told_and_text_has_its_colour(
     tell('tool', 'bad', RED)
     assert (capsys.readouterr().out, sys.stderr.getvalue()) == (
         'would set it\n', 'tool: text\n\x1b[31mtool: bad\x1b[0m\n')
+    monkeypatch.setattr('sys.stderr', left := Mock(write=Mock(side_effect=BrokenPipeError)))
+    tell('tool', 'to a reader that has left')
+    assert left.write.called
 
 
 def test_empty_file_may_be_replaced(tmp_path: Path) -> None:
     (tmp_path / 'new').touch()
     assert may_replace(str(tmp_path / 'new'), lambda place: False)
     assert not may_replace(__file__, lambda place: False)
+    assert not may_replace(__file__, Mock(side_effect=PermissionError))
+
+
+def test_file_with_the_name_of_a_port_is_a_file(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path('ttyS1.cap').touch()
+    assert [*map(is_port, ('ttyS1.cap', 'ttyS1', 'ttyS2.cap'))] == [False, True, True]
 
 
 def test_columns_of_a_table_are_aligned() -> None:

@@ -175,7 +175,7 @@ class LiveValues:
         is_live = is_terminal(sys.stdout) and not self._csv
         if (lost := self._lost - self._lost_reported) and not is_live:
             self._lost_reported += lost
-            tell('plc', f'{counted(lost, "read")} lost: this output was too slow for them')
+            tell('plc', f'{counted(lost, "read")} lost: this output was too slow')
         for mapping in self._mappings:
             error = self._driver.points[mapping].error
             if error is not None:

@@ -73,6 +73,14 @@ def test_faults_name_the_argument(address: str, cells: dict[str, str], text: str
     assert str(caught.value) == text
 
 
+def test_word_pairs_of_a_function_file_are_whole_numbers() -> None:
+    cells = {'Command': 'Read', 'Station': '1', 'PLC_Type': 'SLC'}
+    assert [(str(part.address), part.type.value, part.length)
+            for part in data.mappings_of('HSC:0', cells)] == [
+        ('HSC:0', 'int16', 2), ('HSC:0.MOD', 'int16', 1), ('HSC:0.ACC', 'int32', 5),
+        ('HSC:0.OMB', 'int16', 3)]
+
+
 @for_all(('address', 'kind', 'number', 'expected'), [
     ('N7:5', '', 3, 'N7:8'), ('N7:5', 'int32', 3, 'N7:11'), ('F8:2', '', 2, 'F8:4'),
     ('B3:0/5', '', 3, 'B3:0/8'), ('B3:0/5', '', 11, 'B3:1/0'), ('I:1.0/15', '', 1, 'I:1.1/0'),
@@ -86,6 +94,8 @@ def test_rows_of_values() -> None:
     assert [*data.rows(mapping, array('h', [*range(11), -100]), data.labels(mapping, None))] == [
         ('N7:3', '   0     1     2     3     4     5     6     7     8     9'),
         ('N7:13', '  10  -100')]
+    words = data.rows(make('N7:0', Length='2'), array('h', [5, 0]), 'ab', data.Radix.BINARY)
+    assert [*words] == [('a', '0000000000000101  /0 /2'), ('b', f'{"0" * 16}       ')]
     assert list(data.rows(make('F8:0'), array('f', [0.1]), ['F8:0'])) == [('F8:0', '0.1')]
     assert list(data.rows(make('ST9:0'), 'a\nb', ['ST9:0'])) == [('ST9:0', r"'a\nb'")]
 
@@ -130,6 +140,7 @@ def test_text_that_is_no_value_is_a_format_error(address: str, texts: list[str])
     ('N7:0', '0xFFFF', '"0xFFFF" is not a valid int16, a whole number from -32768 to 32767; '
                        '--type uint16 allows it'),
     ('N7:0', '65536', '"65536" is not a valid int16, a whole number from -32768 to 32767'),
+    ('N7:0', '-32769', '"-32769" is not a valid int16, a whole number from -32768 to 32767'),
     ('B3:0/1', '2', '"2" is not a valid bool, 0 or 1'),
     ('F8:0', '1_000', '"1_000" is not a valid float32, a number such as -1.5 or 2e3'),
     ('F8:0', '1,000', '"1,000" could be two numbers; write 1000 or 1.000')])

@@ -30,7 +30,7 @@ import math
 from pathlib import Path
 
 from abdf1_ros.cli.plc.command import main
-from abdf1_ros.cli.plc.exports.form import scaling, Unusable, Wanted
+from abdf1_ros.cli.plc.exports.form import scaling, Unusable, Wanted, whole_length
 from abdf1_ros.cli.plc.exports.imported import import_map
 from abdf1_ros.cli.terminal import called
 from abdf1_ros.pccc.file_types import PlcType
@@ -92,7 +92,7 @@ def imported(folder: Path, text: str | bytes,
     ('"Down","N7:22",Short,1,RO,100,Linear,0,100,2,12,Float,0,0,,"",1',
      {'Scale': '-0.1', 'Offset': '-2'}),
     ('"Back","N7:24",Short,1,R/W,100,Linear,0,100,0,10,Float,1,1,,"",1',
-     {'Scale': '-0.1', 'Min': '-10', 'Max': '0'}),
+     {'Scale': '-0.1', 'Offset': '0', 'Min': '-10', 'Max': '0'}),
     ('"Comma","N7:27",Short,1,R/W,100,Linear,0,100,"0,5","10,5",Float,0,1,,"",',
      {'Scale': '0.1', 'Offset': '0.5', 'Max': '10.5'}),
     ('"#1 pump","N7:25",Short,1,RO,100,,,,,,,,,,"",', {'Tag': '#1 pump', 'Topic': 't1_pump'}),
@@ -201,7 +201,7 @@ def test_text_of_windows_with_line_ends_in_cells_and_semicolons(tmp_path: Path) 
     assert (mapping.tag, mapping.name, mapping.description) == (
         'Höhe', 'H_he', 'Höhe links\N{REPLACEMENT CHARACTER} [mm]')
     rows = ('"Up","N7:0",Short,1,RO,100,,,,,,,,,,"Up\nleft",\n'
-            '"Down","?",Short,1,RO,100,,,,,,,,,,"",\n')
+            '"Down","?",Short,1,RO,100,,,,,,,,,,"Down\nleft",\n')
     assert imported(tmp_path, KEPSERVER + rows)[1][0].startswith('4: Down: ')
 
 
@@ -306,9 +306,9 @@ def told(mappings: list[Mapping]) -> list[tuple[str, ...]]:
 
 
 def test_columns_of_a_list_are_found_by_their_names(tmp_path: Path) -> None:
-    symbols = 'Address,Symbol,Description\nN7:0,SPEED,Conveyor speed\nB3:0/5,RUN,\n'
+    symbols = 'Address,Symbol,Description\nN7:0,SPEED,a;b;c;d;e;f;g;h\nB3:0/5,RUN,\n'
     assert told(imported(tmp_path, symbols)[0]) == [
-        ('SPEED', 'Read', 'N7:0', 'Conveyor speed'), ('RUN', 'Read', 'B3:0/5', '')]
+        ('SPEED', 'Read', 'N7:0', 'a;b;c;d;e;f;g;h'), ('RUN', 'Read', 'B3:0/5', '')]
     drawing = ('sep=;\nAddress;Description 1;Description 2;Wire No;Name;Device Tag\n'
                'I:1.0/0;START;CONVEYOR;1000;Button;PB100\n')
     assert told(imported(tmp_path, drawing)[0]) == [('PB100', 'Read', 'I:1.0/0', 'START CONVEYOR')]
@@ -436,6 +436,10 @@ def test_tags_of_intouch(tmp_path: Path) -> None:
     assert {(row.command.value, row.period) for row in unknown} == {('Read', 700)}
     assert imported(tmp_path, INTOUCH.replace('Linear', 'Square Root'))[1] == [
         '9: Speed: Conversion "Square Root" has no counterpart; Linear has']
+    assert imported(tmp_path, INTOUCH.replace('100,0,1000', '100,,1000'))[1] == [
+        '9: Speed: the ends of its scale should be numbers, and both raw ones differ: '
+        ', 1000, 0, 100']
+    assert cell_of(imported(tmp_path, INTOUCH.replace('Yes\n', 'No\n'))[0][2], 'Max') == '10'
     assert +import_map(str(tmp_path / 'export.csv'), Wanted()).ignored == {
         'tags without a PLC (memory, groups, trends)': 1}
 
@@ -455,6 +459,10 @@ def test_rows_of_several_plcs_are_not_mixed(tmp_path: Path) -> None:
     for node in ('X', ''):
         with pytest.raises(ConfigurationError, match=f'has no PLC "{node}"; it has PLC1, PLC2'):
             imported(tmp_path, text, Wanted(node=node))
+    text = INTOUCH + '"None","$System","",0,1,0,1,Linear,"",No,"N7:0",No\n'
+    with pytest.raises(ConfigurationError, match='rows of several PLCs: PLC1, "";'):
+        imported(tmp_path, text)
+    assert 'None' not in [row.tag for row in imported(tmp_path, text, Wanted(node='PLC1'))[0]]
 
 
 def test_nothing_is_left_behind_where_no_row_can_be_used(
@@ -490,7 +498,8 @@ IGNITION = """\
      "documentation": "Conveyor\\nnorth", "engUnit": "m/min", "scaleMode": "Linear", "rawLow": 0,
      "rawHigh": 100, "scaledLow": 0.0, "scaledHigh": 10.0},
     {"name": "Shown", "tagType": "AtomicTag", "valueSource": "expr", "value": 1},
-    {"name": "Wait", "valueSource": "opc", "opcItemPath": "[MLX]T4:1.ACC"}]},
+    {"name": "Dry", "tags": [{"name": "Wait", "valueSource": "opc", "scaleMode": "Off",
+                              "opcItemPath": "[MLX]T4:1.ACC"}]}]},
   {"name": "Root", "valueSource": "opc", "scaleMode": "SquareRoot", "opcItemPath": "[MLX]N7:1"},
   {"name": "Any", "valueSource": "opc", "opcItemPath": {"bindType": "parameter"}}]}
 """
@@ -502,10 +511,10 @@ def test_tags_of_ignition(tmp_path: Path) -> None:
         'Tag', 'Command', 'Address', 'Type', 'Scale', 'Offset', 'Description')] == [
             'Line 1/Speed', 'ReadWrite', 'N7:0', 'int16', '0.1', '0', 'Conveyor north [m/min]']
     assert [cell_of(wait, column) for column in ('Tag', 'Command', 'Address')] == [
-        'Line 1/Wait', 'Read', 'T4:1.ACC']
+        'Line 1/Dry/Wait', 'Read', 'T4:1.ACC']
     assert left_out == [
-        '9: Root: scaleMode SquareRoot has no counterpart; Linear has',
-        '10: Any: opcItemPath {"bindType": "parameter"} has no address, as in ns=1;s=[PLC]N7:0']
+        '10: Root: scaleMode SquareRoot has no counterpart; Linear has',
+        '11: Any: opcItemPath {"bindType": "parameter"} has no address, as in ns=1;s=[PLC]N7:0']
     result = import_map(str(tmp_path / 'export.csv'), Wanted(read_only=True, period=700))
     assert result.lines[0] == 'Line 1/Speed,Read,N7:0,1,SLC,,,700,0.1,0,,,Conveyor north [m/min]'
     assert +result.ignored == {'tags that are not of a PLC': 1}
@@ -534,6 +543,8 @@ def test_list_with_comments_and_whole_timers(tmp_path: Path) -> None:
         (row.tag, str(row.address), row.length, row.period) for row in rows] == [
             ('SPEED', 'N7:0', 1, 700), ('MIX', 'T4:0', 3, 700), ('WAIT', 'T4:1.ACC', 1, 700),
             ('LEVEL', 'F8:0', 1, 700)]
+    # A PD element of a PLC-5 has floats, too.
+    assert [whole_length('PD9:0', kind) for kind in (PlcType.SLC, PlcType.PLC5)] == ['23', '']
 
 
 @pytest.mark.parametrize('text, told', [

@@ -124,7 +124,8 @@ def test_help_of_all_commands_loads_next_to_nothing() -> None:
 
 @for_all(('words', 'parsed'), [
     (['help'], ['--help']), (['help', 'read'], ['read', '--help']),
-    (['read', 'help'], ['read', '--help']), (['read', 'N7:0'], ['read', 'N7:0']), ([], [])])
+    (['read', 'help'], ['read', '--help']), (['read', 'N7:0'], ['read', 'N7:0']), ([], []),
+    (['write', 'ST9:0=a=b'], ['write', 'ST9:0', 'a=b'])])
 def test_help_is_also_a_word(words: list[str], parsed: list[str]) -> None:
     assert help_asked(words) == parsed
 

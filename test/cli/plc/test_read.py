@@ -100,8 +100,9 @@ def test_rows_of_a_map_are_read_by_their_tags(plc: Plc, tmp_path: Path) -> None:
 
 def test_map_says_of_each_tag_what_options_say_of_addresses(plc: Plc, tmp_path: Path) -> None:
     path = str(write_csv(tmp_path / 'map.csv', *MAP_OF_TAGS))
-    assert plc('read', 'level', '--length', '2', '--map', path).err == (
-        'plc: --length: is for addresses; for tags the map has this value\n')
+    assert plc('read', 'level', '--length', '2', '--via', '0', '--map', path).err == ''.join(
+        f'plc: --{name}: is for addresses; for tags the map has this value\n'
+        for name in ('length', 'via'))
     assert plc('read', 'level', '--station', '1', '--map', path).err == (
         'plc: --station: the map has level at station 2\n')
     assert plc('read', 'level', 'speed', '--station', '2', '--map', path).err == (
@@ -109,7 +110,7 @@ def test_map_says_of_each_tag_what_options_say_of_addresses(plc: Plc, tmp_path: 
     assert plc('read', '--station', '2', '--map', path).lines == ['N7:30 level 2330 % Tank 4 [%]']
     assert plc('read', '--station', '0', '--map', path).err == (
         f'plc: {path}: has no row of station 0 that is read\n')
-    assert plc('read', 'Level', '--map', path).err.endswith(
+    assert plc('read', 'LEVEL', '--map', path).err.endswith(
         'tags that are read: speed, level; did you mean level?\n')
     assert plc('read', 'level', '--map', path, '--own-station', '2').err == (
         f'plc: {path}:3: Item: 2, Station 2 is our own Station in the net file; write the '

@@ -121,7 +121,7 @@ def test_reads_that_the_output_does_not_take_are_counted_and_others_keep_their_t
     shown = datetime.now()
     watch.show()
     said, told = capsys.readouterr()
-    assert told == 'plc: 3 reads lost: this output was too slow for them\n'
+    assert told == 'plc: 3 reads lost: this output was too slow\n'
     watch.show()
     assert capsys.readouterr() == ('', '')
     for lost in (1, 2):  # since the last call each
