@@ -126,6 +126,7 @@ def test_plan_of_the_good_rows(check: Check, files: Paths) -> None:
     assert f'error: {files[1]}:5: Item: 4, a Serve row has our own Station, which is 5' in out
     assert 'this plan has only the rows without errors' in out
     assert '1 mapping is read with 1 block' in out and 'no errors' not in out
+    assert 'this plan' not in check(GOOD_NET, BAD_ROWS, status=2)
 
 
 def test_files_in_the_wrong_order_are_told_once_each(
@@ -281,6 +282,10 @@ def test_output_that_cannot_take_it_is_no_traceback(files: Paths) -> None:
     full = subprocess.run(f'{command} >/dev/full', shell=True, text=True, capture_output=True,
                           timeout=30, check=False)
     assert (full.returncode, full.stderr) == (2, 'check: cannot print: No space left on device\n')
+    write_csv(files[1], MAP_HEADER, BAD_ROWS)
+    left = subprocess.run(['bash', '-c', f'{command} | true; exit ${{PIPESTATUS[0]}}'], text=True,
+                          capture_output=True, timeout=30, check=False)
+    assert (left.returncode, left.stderr) == (2, '')  # the files are bad, also without a reader
 
 
 # A folder
@@ -411,8 +416,10 @@ def test_rows_that_a_recording_fills_are_told(tmp_path: Path, capsys: Output) ->
     assert content['rows']['unread'] == 'no other node reads it'
     assert any('word range read N7:7, 3 words' in text for text in content['reads'])
     assert main([str(net), str(rows), '--heard', str(tmp_path / 'none.cap')]) == 2
-    assert f'error: {tmp_path}/none.cap: No such file' in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert f'error: {tmp_path}/none.cap: No such file' in said and 'fills' not in said
     assert main([str(rows), str(rows), '--heard', str(heard)]) == 2  # without a net file
     net.write_text('Com_Port,Error_Code\n/dev/ttyS0,BCC\n', encoding='utf-8')
+    rows.write_text(rows.read_text('utf-8').replace('unread,Read,', 'unread,ReadWrite,'), 'utf-8')
     assert main([str(net), str(rows), '--heard', str(heard)]) == 0
-    assert 'the recording fills 0 of 3 rows' in capsys.readouterr().out
+    assert 'the recording fills 0 of 2 rows' in capsys.readouterr().out

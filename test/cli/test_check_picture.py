@@ -113,6 +113,8 @@ def test_periods_that_cannot_be_kept_are_red(tmp_path: Path, capsys: Output) -> 
     assert found.bars('bad') == 2 * (len(ROWS) + 1)  # a line that is too busy keeps none
     assert found.bars('ask') == 1  # without a Period there is nothing to keep
     assert found.found.count(('b', {'class': 'is-bad'})) == len(ROWS) + 1  # in the table
+    (limit,) = (float(each['x1']) for _, each in found.found if each.get('class') == 'limit')
+    assert limit == pytest.approx(NAMES + 1030 / 5.67, abs=2)  # 100 of 567 %
     assert ('p', {'class': 'verdict is-bad'}) in found.found
     assert 'Reads with Period 0 have the time that is left.' in found.texts
     assert any(text.startswith('4 of 5 reads cannot keep the Period') for text in found.texts)
@@ -180,10 +182,11 @@ def test_file_of_another_program_is_not_replaced(tmp_path: Path, capsys: Output)
 def test_picture_that_cannot_be_written_is_told(tmp_path: Path, capsys: Output) -> None:
     write_csv(tmp_path / 'net.csv', NET_HEADER, ['5,Master,9600,1'])
     write_csv(tmp_path / 'map.csv', MAP_HEADER, ROWS)
-    said = call(main, capsys, str(tmp_path / 'net.csv'), str(tmp_path / 'map.csv'),
-                '--html', str(tmp_path / 'no' / 'plan.html'))
-    assert said.status == 2
-    assert '--html: ' in said.err and 'No such file or directory' in said.err
+    for more in ((), ('--json',)):
+        said = call(main, capsys, str(tmp_path / 'net.csv'), str(tmp_path / 'map.csv'),
+                    '--html', str(tmp_path / 'no' / 'plan.html'), *more)
+        assert said.status == 2
+        assert '--html: ' in said.err and 'No such file or directory' in said.err
 
 
 @pytest.mark.long
