@@ -92,7 +92,7 @@ def imported(folder: Path, text: str | bytes,
     ('"Down","N7:22",Short,1,RO,100,Linear,0,100,2,12,Float,0,0,,"",1',
      {'Scale': '-0.1', 'Offset': '-2'}),
     ('"Back","N7:24",Short,1,R/W,100,Linear,0,100,0,10,Float,1,1,,"",1',
-     {'Scale': '-0.1', 'Offset': '0', 'Min': '-10', 'Max': '0'}),
+     {'Scale': '-0.1', 'Min': '-10', 'Max': '0'}),
     ('"Comma","N7:27",Short,1,R/W,100,Linear,0,100,"0,5","10,5",Float,0,1,,"",',
      {'Scale': '0.1', 'Offset': '0.5', 'Max': '10.5'}),
     ('"#1 pump","N7:25",Short,1,RO,100,,,,,,,,,,"",', {'Tag': '#1 pump', 'Topic': 't1_pump'}),
@@ -141,6 +141,7 @@ def test_tag_that_cannot_be_used_is_left_out_and_stays_as_a_comment(
 def test_scale_has_four_numbers(ends: tuple[str, ...]) -> None:
     with pytest.raises(Unusable, match='the ends of its scale should be numbers, .* differ: 0?,'):
         scaling(ends)
+    assert scaling(('0', '5', '0', '9'), -1.0) == {'Scale': '-1.8', 'Offset': '0'}  # not -0
 
 
 def test_each_row_of_a_name_says_where_it_is_used(tmp_path: Path) -> None:

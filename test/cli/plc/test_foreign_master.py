@@ -121,6 +121,9 @@ def test_silent_line_is_listened_to_at_one_speed(
     assert overhear.overhear(Network(com_port=str(line.name)), (19200, 9600), shown.append) is None
     line.close()
     assert shown == ['listening at 19200 baud']
+    # A device server takes its speed only from a port that may write.
+    assert [overhear.silent(Network(com_port=f'{scheme}://x:1')).mode
+            for scheme in ('rfc2217', 'socket')] == ['Master', 'Listen']
 
 
 @pytest.mark.parametrize(('polls', 'told'), [
