@@ -246,7 +246,7 @@ def parse_values(mapping: Mapping, texts: Sequence[str]) -> Sequence[float] | st
     """Return the values of texts; whole numbers also as 0x, 0b. FormatError for bad texts."""
     if texts and mapping.message_type is ValueType.STRING:
         if len(texts) != 1:
-            raise FormatError(f'{mapping.address} takes one text; quote it if it has spaces')
+            raise FormatError('takes one text; quote it if it has spaces')
         return texts[0]
     return [_number(mapping, text) for text in texts]
 

@@ -28,6 +28,7 @@ from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.problems import Problem
 from abdf1_ros.settings.rows import Rows
+from abdf1_ros.text import counted
 
 # Period of the proposed rows (ms): reading all files of a PLC is a lot for a slow line.
 _DRAFT_PERIOD = 5000
@@ -91,7 +92,7 @@ def outside(found: Sequence[DataFile], mappings: Rows,
         elif entry.type is not address.file_type:
             fault = f'file {address.file} is {entry}'
         elif mapping.extent.end > entry.elements * address.layout.words:
-            fault = f'{entry} has only {entry.elements} elements'
+            fault = f'{entry} has only {counted(entry.elements, "element")}'
         if fault:
             yield Problem(replace(mapping.place, column='Address'),
                           f'{address}, Length {mapping.length}: {fault}')

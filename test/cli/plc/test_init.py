@@ -235,14 +235,16 @@ def test_rows_of_a_map_that_lie_outside_of_the_files(
     assert main(['files', '2', *line]) == 0
     assert capsys.readouterr().out == 'all rows of station 2 lie inside\n'
     path.write_text(header + 'a,Read,N7:90,2,SLC,11\nb,Read,N10:0,2,SLC,1\n'
-                    'c,Read,B12:0,2,SLC,\nd,Read,N7,2,SLC,\n', encoding='utf-8')
+                    'c,Read,B12:0,2,SLC,\nd,Read,N7,2,SLC,\ne,Read,B3:1,2,SLC,\n',
+                    encoding='utf-8')
     assert main(['files', '2', *line]) == 1
     said = capsys.readouterr()
     assert f'{path}:5:3 (Address): 2503' in said.err
     assert said.out.splitlines() == [
         f'{path}:2 (Address): N7:90, Length 11: N7 has only 100 elements',
         f'{path}:3 (Address): N10:0, Length 1: file 10 is F10',
-        f'{path}:4 (Address): B12:0, Length 1: there is no file 12']
+        f'{path}:4 (Address): B12:0, Length 1: there is no file 12',
+        f'{path}:6 (Address): B3:1, Length 1: B3 has only 1 element']
 
 
 def test_directory_takes_few_reads(port: str, capsys: Output) -> None:
