@@ -181,6 +181,8 @@ def test_recordings_one_after_the_other_and_without_times(tmp_path: Path, capsys
                      [(0.9, '<', broken), *silence(3.0), (3.1, '<', frames.EOT)])
     found = drawn(tmp_path, capsys, first, second)
     assert {'All of it', 'Recording 2'} <= {*found.texts}
+    half = capture(tmp_path / 'half', [(60, '>', b'\x10')])  # no entry before the next recording
+    assert 'Recording 2' in drawn(tmp_path, capsys, half, second).texts
     assert {'r1s0', 'r1s50', 'r2s0'} <= {element.get('id') for _, element in found.found}
     assert found.texts.count('silence: no answer to the poll') == 2
     assert found.bars('ask') == 2

@@ -276,8 +276,8 @@ def test_option_that_may_be_meant(
                                        'in 1,2,3'),
     ('?', 'STATION', ['1', '2'], '2; it takes one STATION'),
     ('?', 'STATION', ['--station', '1'], '--station; did you mean STATION without --station?'),
-    ('+', 'ADDRESS', ['a', '--net', 'n', 'b'], 'b; these stand together, before or after all '
-                                               'options')])
+    *((many, 'ADDRESS', ['a', '--net', 'n', 'b'], 'b; these stand together, before or after all '
+       'options') for many in '+*')])
 def test_words_that_are_too_many_are_told_where_they_belong(
         nargs: str, name: str, given: list[str], hint: str,
         capsys: pytest.CaptureFixture[str]) -> None:

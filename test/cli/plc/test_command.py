@@ -22,9 +22,11 @@ import re
 import signal
 import subprocess
 import sys
+from unittest import mock
 from unittest.mock import Mock
 
 from abdf1_ros.cli.plc.command import main
+from abdf1_ros.cli.plc.verbs import scan
 from abdf1_ros.errors import FormatError
 import pytest
 from support.cases import for_all
@@ -122,10 +124,15 @@ def test_plc_without_diagnostic_status_is_not_called_a_missing_file(
     assert 'station 2: does not identify itself (STS 10 to the question); give --plc-type' in (
         said.err)
     assert 'file' not in said.err
+    simulator.say('error 2 20')
+    said = plc('read', 'N7:0', '--station', '2', '--plc-type', 'SLC')
+    assert 'N7:0 of station 2: STS 20' in said.err and 'file' not in said.err
 
 
-def test_scan_of_nobody_has_status_1(plc: Plc) -> None:
+def test_scan_of_nobody_has_status_1(plc: Plc, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(scan, 'Progress', progress := Mock())
     said = plc('scan', '8,9', *FAST)
+    assert progress.return_value.mock_calls[-1] == mock.call.clear()  # before the tally
     assert (said.status, said.lines) == (
         1, ['0 of 2 stations answer; silent stations were asked 2 times'])
     assert 'sent: ' not in said.err  # nothing was lost on this line

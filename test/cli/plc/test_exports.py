@@ -156,14 +156,16 @@ def test_each_row_of_a_name_says_where_it_is_used(tmp_path: Path) -> None:
 
 
 def test_symbols_of_rslogix_become_rows_and_the_rest_is_told(tmp_path: Path) -> None:
-    rows = RSLOGIX + '"DFILE:N7","","","Numbers"\n"PLS10:0","Global","CAM"\n"","Global","LOST"\n'
+    rows = RSLOGIX + ('"DFILE:N7","","","Numbers"\n"PLS10:0","Global","CAM"\n'
+                      '"","Global","LOST"\n"PLS11:0","Global",""\n')
     mappings, left_out = imported(tmp_path, rows)
     assert [(mapping.tag, mapping.name, str(mapping.address), mapping.length, mapping.description)
             for mapping in mappings] == [
         ('DOOR_CLOSED', 'DOOR_CLOSED', 'I:1.0/3', 1, 'Guard door cell 2'),
         ('LINE_SPEED', 'LINE_SPEED', 'N7:0', 1, 'Conveyor speed'),
         ('T4_0', 'T4_0', 'T4:0', 3, 'Cycle timer'), ('WAIT', 'WAIT', 'T4:1.ACC', 1, '')]
-    assert [text.partition(': ')[0] for text in left_out] == ['6', '7']
+    assert [text.split(': ')[:2] for text in left_out] == [
+        ['6', 'CAM'], ['7', 'LOST'], ['8', 'PLS11:0']]
     assert left_out[1] == '7: LOST: Address is missing'
     assert not any(mapping.remarks for mapping in mappings)
 

@@ -22,11 +22,12 @@ import select
 import socket
 import threading
 from types import SimpleNamespace
+from unittest.mock import call, Mock
 
 from abdf1_ros import client
 from abdf1_ros.cli import check
 from abdf1_ros.cli.overhearing import map_of, texts_of
-from abdf1_ros.cli.plc import line, overhear
+from abdf1_ros.cli.plc import detect, line, overhear
 from abdf1_ros.cli.plc.command import main
 from abdf1_ros.cli.plc.verbs import init
 from abdf1_ros.cli.terminal import called
@@ -105,9 +106,11 @@ def test_line_that_has_a_master_is_only_listened_to(
         tmp_path: Path, capsys: Output, command: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(overhear, 'LISTENED_FOR_READS', 0.2)
     into = ['--into', str(tmp_path / 'new')] if command == 'init' else []
+    monkeypatch.setattr(detect, 'Progress', progress := Mock())
     with master_on(tmp_path / 'line', 1, 3, 7) as (port, master):
         assert main([command, '--port', port, *into]) == 1
         assert master.heard == b''
+    assert progress.return_value.mock_calls[-1] == call.clear()  # before it is told
     assert capsys.readouterr().err.splitlines()[-1].startswith(
         'plc: another master polls stations 1, 3, 7, 19200 baud, check unknown: nothing was sent.')
     assert not (tmp_path / 'new').exists()

@@ -89,7 +89,7 @@ def test_init_writes_files_that_the_node_takes(port: str, tmp_path: Path, capsys
 
 
 def test_full_disk_leaves_no_file(tmp_path: Path) -> None:
-    files = NewFiles(tmp_path / 'new', 'net.csv', 'map.csv')
+    files = NewFiles(tmp_path / 'plant' / 'line_1', 'net.csv', 'map.csv')
     with no_file_longer_than(10), pytest.raises(ConfigurationError,
                                                 match='map.csv: cannot be written: File too'):
         files.write('short', 'too long for it')

@@ -102,14 +102,14 @@ def test_what_stays_is_shown_once(plcs: Plcs, capsys: Output) -> None:
 def test_each_read_is_a_line_of_csv_for_each_value(
         plcs: Plcs, capsys: Output, tags: Tags | None, title: str, first: str, other: str) -> None:
     store(plcs[1], 'ST9:0', 'a,"b"')
-    words, name = (mapping_of(text, {'Command': 'Read', 'Station': '1', 'PLC_Type': 'PLC5'})
-                   for text in ('N7:0-1', 'ST9:0'))
+    cells = {'Command': 'Read', 'Station': '1', 'PLC_Type': 'PLC5'}
+    words, name = mapping_of('N7:0-1', cells), mapping_of('ST9:0', cells | {'Period': '100'})
     assert LiveValues(network_on(plcs), [words, name], 0.01, csv=True, tags=tags).run(2) == 0
     head, *lines = capsys.readouterr().out.splitlines()
     assert head == f'time,station,address,{title}value'
     told = [line.partition(',')[2] for line in lines]
     assert told.count(f'1,N7:0,{first}0') == told.count(f'1,N7:1,{other}0') >= 2
-    assert f'1,ST9:0,{other}"a,""b"""' in told
+    assert told.count(f'1,ST9:0,{other}"a,""b"""') >= 2
 
 
 def test_reads_that_the_output_does_not_take_are_counted_and_others_keep_their_times(
