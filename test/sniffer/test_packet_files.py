@@ -139,7 +139,8 @@ def test_pccc_of_a_real_processor_is_told_in_words(tmp_path: Path, content: byte
 def test_packets_that_the_recorder_has_cut_are_told_and_others_read(tmp_path: Path) -> None:
     packets = exchange()
     whole = exchange(1001.0)
-    cut = [(time, data[:90]) for time, data in packets]
+    others = (1000.0, packets[0][1].replace((44818).to_bytes(2, 'big'), b'\0\x50'))
+    cut = [(time, data[:90]) for time, data in (*packets, others)]
     with pytest.raises(Problem, match='2 packets cut by the recorder, at 90 bytes: what was in '
                                       'them is missing; record whole packets'):
         chunks_of(tmp_path / 'x', pcap(cut))
@@ -215,11 +216,13 @@ def test_unfinished_messages_of_a_thousand_connections_are_kept(
 def test_two_plcs_whose_addresses_end_alike_are_two_stations(tmp_path: Path) -> None:
     packets = [(0.0, ethernet(tcp(encapsulated(cip(STATUS)), 1))),
                (0.1, ethernet(tcp(encapsulated(cip(STATUS)), 1, net=7))),
+               (0.1, ethernet(tcp(encapsulated(cip(b'\6\0\1\0\3')), 59, net=7))),  # at once
                (0.2, ethernet(tcp(encapsulated(cip(STATUS_REPLY, True)), 9, False, net=7))),
                (0.3, ethernet(tcp(encapsulated(cip(STATUS_REPLY, True)), 9, False, net=8)))]
     entries = entries_of(chunks_of(tmp_path / 'x', pcap(packets)))
     assert [(entry.kind, entry.station) for entry in entries if entry.packet] == [
-        (Kind.COMMAND, 30), (Kind.COMMAND, 254), (Kind.REPLY, 254), (Kind.UNANSWERED, 30)]
+        (Kind.COMMAND, 30), (Kind.COMMAND, 254), (Kind.COMMAND, 254), (Kind.REPLY, 254),
+        (Kind.UNANSWERED, 30), (Kind.UNANSWERED, 254)]
     assert not any(entry.marks for entry in entries)
 
 
@@ -241,8 +244,9 @@ def test_what_sniff_has_written_is_read_as_it_was(tmp_path: Path) -> None:
             writer.write(entry)
         writer.close()
         said = [entry for entry in entries if entry.wire]
-        again = [entry for entry in entries_of(list(Recording(tmp_path / 'own').chunks()))
-                 if entry.wire]
+        read = list(Recording(tmp_path / 'own').chunks())
+        assert [chunk.data for chunk in read] == [entry.wire for entry in said]
+        again = [entry for entry in entries_of(read) if entry.wire]
         assert [(entry.kind, entry.wire, entry.text) for entry in again] == [
             (entry.kind, entry.wire, entry.text) for entry in said]
 

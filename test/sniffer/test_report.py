@@ -73,7 +73,10 @@ def test_entry_is_told_as_json_with_all_its_fields() -> None:
         'marks': ['retransmission'], 'dst': 1, 'src': 5, 'command': '06/00', 'sts': 0,
         'tns': 0x1234, 'data': '0001'}
     assert json.loads(json_line(REPLY))['latency_ms'] == 750.0
-    assert json.loads(json_line(replace(NOISE, time=0.0)))['time'] == 0.0
+    at_once = json.loads(json_line(replace(
+        REPLY, time=0.0, station=0, latency=0.0, marks=(Mark.DUPLICATE, Mark.STRAY))))
+    assert [at_once[name] for name in ('time', 'station', 'latency_ms', 'marks')] == [
+        0.0, 0, 0.0, ['duplicate', 'stray']]
     assert json.loads(json_line(NOISE)) == {
         'time': 3.0, 'direction': '<', 'kind': 'noise', 'text': '2 bytes outside of any frame',
         'bytes': 2}
@@ -146,9 +149,9 @@ def test_entries_are_counted_for_the_line_and_for_their_station() -> None:
     assert sorted(summary.stations) == [1, 2]
 
 
-def _heard(summary: Summary) -> Summary:
-    summary.take(Chunk(10.0, OUT, bytes(300)))
-    summary.take(Chunk(11.0, IN, bytes(180)))
+def _heard(summary: Summary, begun: float = 10.0) -> Summary:
+    summary.take(Chunk(begun, OUT, bytes(300)))
+    summary.take(Chunk(begun + 1.0, IN, bytes(180)))
     return summary
 
 
@@ -166,6 +169,6 @@ def test_load_is_known_where_baud_and_duplex_are(
 def test_recordings_one_after_the_other() -> None:
     summary = _heard(Summary(9600))
     summary.take(Chunk(None, OUT, b''))  # of one without times
-    _heard(summary)
+    _heard(summary, 4.0)
     assert summary.seconds == 2.0
     assert summary.load(Duplex.HALF) == 0.5

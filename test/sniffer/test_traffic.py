@@ -187,7 +187,7 @@ def test_frames_of_real_processors(said: tuple[str, ...], told: list[str]) -> No
 
 
 def test_noise_is_counted_and_told_once() -> None:
-    entries = decode([(IN, b'\x01\x02'), (IN, b'\x03'), (IN, frames.EOT), (IN, b'\xff')])
+    entries = decode([(IN, b'\x01\x02'), (IN, b'\x03'), (IN, frames.EOT), (IN, b'\x10')])
     assert [(entry.kind, entry.size, entry.text) for entry in entries] == [
         (Kind.NOISE, 3, '3 bytes outside of any frame'), (Kind.EOT, 0, 'nothing to send'),
         (Kind.NOISE, 1, 'a byte outside of any frame')]
