@@ -364,8 +364,9 @@ def test_download_brings_back_the_words_of_the_start() -> None:
     clock, plc = _with_ladder()
     for _ in range(2):
         store(plc, 'N10:0', [5, 42])
+        clock.now += 1.0
         plc.download()
-        assert stored(plc, 'N10:0', 2) == bytes(4)
+        assert (stored(plc, 'N10:0', 2), stored(plc, 'N11:3')) == (bytes(4), bytes(2))
     assert not plc.is_running
     clock.now += 3.0
     plc.set_mode(Setting.REMOTE)
@@ -415,6 +416,7 @@ def test_plcs_behind_a_gateway_are_one_station_of_the_line(tmp_path: Path) -> No
         ('1,PLC5,F8:0,,,,,11', 'station 1 is behind gateway 10 already'),
         ('1,PLC5,F8:0,,,,,', 'station 1 is behind gateway 10 already'),
         ('10,PLC5,F8:0,,,,,', 'station 10 is a PLC, it cannot be a gateway too'),
+        ('5,PLC5,F8:0,,,,,5', 'station 5 is a PLC, it cannot be a gateway too'),
         ('2,PLC5,F8:0,,,,,0', 'Via = "0" should be a whole number from 1 to 254')))])
 def test_rows_that_contradict_each_other(path: Path, first: str, second: str, text: str) -> None:
     assert faults(path, first, second) == [text]
