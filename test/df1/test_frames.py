@@ -169,9 +169,13 @@ def test_noise_between_symbols_is_skipped_and_its_last_byte_kept() -> None:
     assert decoder.last_byte == 0x77
     decoder.feed(b'')
     assert decoder.last_byte == 0x77
+    decoder.feed(ENQ)
+    assert drain(decoder) == []
     before = decoder.noise
     decoder.feed(Damaged(b'\x66'))
     assert (decoder.last_byte, decoder.noise) == (0x66, before + 1)
+    decoder.feed(b'\x9A' + poll_frame(7))  # the rest of the damaged poll begins nothing
+    assert drain(decoder) == [Poll(7, True)]
 
 
 @for_all('station', [0, 1, 0x0F, 0x10, 0x11, 0x20, 0xF0, 0xFE])
@@ -299,8 +303,8 @@ def test_decoder_takes_any_bytes_and_keeps_few(decoder: FrameDecoder, parts: lis
 
 def test_bytes_that_nobody_reads_are_not_kept_without_end() -> None:
     decoder = FrameDecoder(CRC, Duplex.FULL)
-    for _ in range(40):
-        decoder.feed(ENQ * 1000)
+    for symbol in 39 * [ENQ] + [ACK]:
+        decoder.feed(symbol * 1000)
     assert len(decoder.waiting) == MAX_WAITING
     assert decoder.noise == 80_000 - MAX_WAITING
     assert drain(decoder) == [NOISE] + [Control(Code.ENQ)] * (MAX_WAITING // 2)

@@ -17,6 +17,7 @@
 from collections.abc import Callable
 from contextlib import nullcontext
 import math
+from typing import Any
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import (
@@ -117,14 +118,15 @@ def test_only_a_response_proves_in_full_duplex_that_a_frame_has_left() -> None:
 
 
 def test_response_proves_nothing_while_bytes_have_still_to_leave() -> None:
-    bench = Bench(Send(FRAME, 1.0), Listen(1.0), timing=LineTiming(char_time=0.01),
-                  duplex=Duplex.FULL, start=None)
-    bench.machine.start(0.0, Wire(bench.machine, unsent=lambda: 3))  # no faster than it is set
-    bench.machine.data_to_send()
-    bench.machine.receive_data(ACK, 0.02)
-    assert not bench.machine.sender.has_left(len(FRAME))
-    assert bench.machine.sender.has_left(len(FRAME) - 3)
-    assert bench.machine.deadline == pytest.approx(0.02 + 3 * 0.01 + 1.0)
+    for now, free in ((0.02, 0.05), (0.08, 0.1)):
+        bench = Bench(Send(FRAME, 1.0), Listen(1.0), timing=LineTiming(char_time=0.01),
+                      duplex=Duplex.FULL, start=None)
+        bench.machine.start(0.0, Wire(bench.machine, unsent=lambda: 3))  # as fast as it is set
+        bench.machine.data_to_send()
+        bench.machine.receive_data(ACK, now)
+        assert not bench.machine.sender.has_left(len(FRAME))
+        assert bench.machine.sender.has_left(len(FRAME) - 3)
+        assert bench.machine.deadline == pytest.approx(free + 1.0)
 
 
 def test_symbol_ends_a_step() -> None:
@@ -208,13 +210,14 @@ def test_reflex_waits_for_the_rest_of_a_divided_message() -> None:
     def run(machine: Machine) -> Procedure:
         machine.sender.embeds = True
         yield Send(MESSAGE, 1.0, reflex=eot_on_ack)
-        yield Send(EOT, 1.0)
+        yield Send(EOT, 1.0, expires=5.0)
 
     machine = Machine(run, checksum=Checksum.CRC, timing=LineTiming(0.01), duplex=Duplex.FULL)
     machine.start(0.0)
     sent = machine.data_to_send()
     assert sent != MESSAGE
     machine.receive_data(ACK, 0.1)
+    assert machine.sender.send_before == math.inf  # half a message is never taken back
     sent += machine.data_to_send()
     machine.handle_timeout(9.0)
     assert sent + machine.data_to_send() == MESSAGE + EOT
@@ -290,7 +293,7 @@ def test_what_has_come_before_a_frame_could_leave_is_no_answer_to_it() -> None:
     bench = Bench(Send(FRAME, 1.0), Send(FRAME, 1.0), forget_on_send=True)
     bench.machine.data_to_send()
     bench.machine.handle_timeout(10.0)  # after a pause of the process
-    bench.machine.receive_data(ACK, 10.0)
+    bench.machine.receive_data(EOT, 10.0)
     assert bench.got == [None]
     assert bench.machine.data_to_send() == FRAME
     bench.machine.receive_data(ACK, 10.1)
@@ -392,7 +395,7 @@ def test_message_that_begins_behind_the_time_limit_extends_nothing() -> None:
     bench.machine.receive_data(MESSAGE[5:], 1.2)  # heard out to its end
     assert isinstance(bench.got[0], Frame)
     deadline = bench.machine.deadline
-    bench.machine.receive_data(MESSAGE[:5], 1.4)
+    bench.machine.receive_data(MESSAGE[:5], 1.25)
     assert bench.machine.deadline == deadline
 
 
@@ -434,10 +437,12 @@ def test_idle_master_counts_what_nobody_waits_for() -> None:
 
 
 def test_wake_ends_a_rest() -> None:
-    bench = Bench(Rest(10.0), Send(FRAME, 1.0))
+    clockwork = Clockwork(math.inf)
+    bench = Bench(Rest(10.0), Send(FRAME, 1.0), background=clockwork)
+    clockwork.done = bench.got
     assert bench.machine.deadline == 10.0
     bench.machine.wake(3.0)
-    assert bench.got == [None]
+    assert bench.got == [3.0, None]  # what is new is looked at first
     assert (bench.machine.data_to_send(), bench.machine.deadline) == (FRAME, 4.0)
 
 
@@ -460,7 +465,7 @@ def test_stop_raises_its_error_inside_the_procedure() -> None:
 
 
 def test_start_begins_afresh() -> None:
-    bench = Bench(Send(FRAME, 1.0), Listen(1.0), timing=LineTiming(char_time=1.0))
+    bench = Bench(Send(FRAME, 1.0), Send(FRAME, 1.0), timing=LineTiming(char_time=1.0))
     bench.machine.receive_data(ACK + b'\x10', 0.5)
     bench.machine.start(2.0)
     bench.machine.receive_data(b'\x06', 2.5)
@@ -533,15 +538,15 @@ def test_command_that_expires_before_it_is_given_to_the_port_is_taken_back(embed
             told.append('expired')
         yield Send(ACK, 1.0)
 
-    machine = Machine(run, checksum=Checksum.CRC, timing=LineTiming(0.001), duplex=Duplex.FULL)
+    machine = Machine(run, checksum=Checksum.CRC, timing=LineTiming(0.01), duplex=Duplex.FULL)
     machine.start(5.0)
     assert machine.sender.send_before == 5.5
-    machine.withdraw(9.0)
+    machine.withdraw(6.0)
     assert (told, machine.data_to_send()) == (['expired'], ACK)
     assert machine.sender.send_before == math.inf
     assert (machine.counters.chars_sent, machine.sender.position) == (len(ACK), len(ACK))
-    assert machine.next_call == pytest.approx(9.0 + 1.0 + 0.002)
-    machine.handle_timeout(9.01)
+    assert machine.next_call == pytest.approx(6.0 + 1.0 + 0.02)
+    machine.handle_timeout(6.05)
     assert machine.data_to_send() == b''
 
 
@@ -579,7 +584,7 @@ class Clockwork:
 
     def __init__(self, due: float) -> None:
         self.due = due
-        self.done: list[float] = []
+        self.done: list[Any] = []
 
     def expire(self, now: float) -> None:
         """Do it once."""
@@ -607,10 +612,11 @@ def test_background_has_its_time_while_a_step_waits(due: float, call: float) -> 
 
 def test_rest_ends_with_work_of_the_background() -> None:
     """A message that has waited too long may have held up something that goes out at once."""
-    bench = Bench(Rest(5.0), Send(FRAME, 1.0), start=None, background=Clockwork(1.5))
-    bench.machine.start(1.0)
-    bench.machine.handle_timeout(1.5)
-    assert bench.machine.data_to_send() == FRAME
+    for seconds in (5.0, None):
+        bench = Bench(Rest(seconds), Send(FRAME, 1.0), start=None, background=Clockwork(1.5))
+        bench.machine.start(1.0)
+        bench.machine.handle_timeout(1.5)
+        assert bench.machine.data_to_send() == FRAME
 
 
 # echo
