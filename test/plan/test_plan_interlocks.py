@@ -163,13 +163,14 @@ def test_rule_16_fallback_of_our_own_table_needs_no_line() -> None:
         assert bound.seconds == 0.5
 
 
-@pytest.mark.parametrize('period, factor', [(100, None), (60_000, 3)])
-def test_rule_16_preset_of_the_timer(period: int, factor: int | None) -> None:
-    mapping = beat(period)  # the fallback of the same PLC comes after it
-    bound, _ = Times(QUICK, Rows([mapping, speed()]), (), 0.01).bounds()
+@pytest.mark.parametrize('period, factor, other', [(100, None, 1), (60_000, 3, 1), (100, None, 2)])
+def test_rule_16_preset_of_the_timer(period: int, factor: int | None, other: int) -> None:
+    mapping, fallback = beat(period), speed(station=other)  # that of the same PLC comes after it
+    bound, _ = Times(QUICK, Rows([mapping, fallback]), (), 0.01).bounds()
     own = write_time(QUICK, mapping, 0.0)
     question = line_model(QUICK).transaction_time(1, 26)  # as long as any here
     longer = period / 1000 + at_most(question) + at_most(own) + 0.01
+    longer += (at_most(question) + write_time(QUICK, fallback)) * (other == 2)
     assert bound.seconds == pytest.approx(factor * period / 1000 if factor else longer)
     watchdog = 18_000 if factor else math.ceil(longer * 100)
     assert bound.presets == (watchdog, watchdog + 100)

@@ -287,6 +287,7 @@ def test_rule_14_timeout_has_no_default_and_allows_three_reads() -> None:
     assert faults(row(**DOORS | {'While_Timeout': '299'}), row(**COUNTER)) == [
         '2:21 (While_Timeout): Item: 1, While_Timeout 299 is less than 3 x 100 ms, the '
         'Period of counter']
+    assert faults(row(**DOORS | {'While_Timeout': '300'}), row(**COUNTER)) == []
 
 
 def test_rule_15_a_row_left_out_takes_along_what_depends_on_it() -> None:
@@ -335,7 +336,10 @@ def test_rule_21_no_bit_that_we_write_confirms(ours: dict[str, str]) -> None:
 
 def test_rule_22_a_heartbeat_is_confirmed_once() -> None:
     other = BIT | {'Tag': 'other', 'Address': 'B12:0/3'}
-    assert tags_of(row(**BIT), row(**other), row(**BEAT)) == ['bit', 'beat']
+    station_2 = (row(**BIT | {'Tag': 'bit2', 'Station': '2', 'Confirms': 'beat2'}),
+                 row(**BEAT | {'Tag': 'beat2', 'Station': '2'}))
+    assert tags_of(row(**BIT), row(**other), row(**BEAT), *station_2) == [
+        'bit', 'beat', 'bit2', 'beat2']
 
 
 def test_rule_15_a_heartbeat_left_out_takes_its_bit_along() -> None:

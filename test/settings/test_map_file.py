@@ -48,9 +48,13 @@ def test_bad_file_as_a_whole() -> None:
 
 
 def test_row_that_clashes_counts_for_nothing() -> None:
-    mappings, problems = load_rows(row(Tag='a'), row(Tag='b', Topic='a'), row(Tag='b', Topic='c'))
-    assert [(mapping.tag, mapping.topic) for mapping in mappings] == [('a', 'a'), ('b', 'c')]
-    assert len(problems) == 1
+    mappings, problems = load_rows(
+        row(Tag='a'), row(Tag='b', Topic='a'), row(Tag='b', Topic='c'),
+        row(Tag='a', Command='Heartbeat', Address='N7:9'),
+        row(Tag='d', Command='Write', Address='N7:9'))
+    assert [(mapping.tag, mapping.topic) for mapping in mappings] == [
+        ('a', 'a'), ('b', 'c'), ('d', 'd')]
+    assert len(problems) == 2
 
 
 def test_write_topic_of_engineering_values_fans_out_to_different_raw_types() -> None:
@@ -70,10 +74,11 @@ def test_shipped_file_is_good() -> None:
 
 def test_two_stations_behind_one_gateway() -> None:
     mappings, problems = load_rows(
-        row(Station='1', Via='10'), row(Tag='b', Topic='b', Station='2', Via='10'),
-        row(Tag='c', Topic='c', Station='10'), row(Tag='d', Topic='d', Station='4', Via='4'))
+        row(Station='1', Via='10'), row(Tag='b', Topic='b', Station='10'),
+        row(Tag='c', Topic='c', Station='2', Via='10'),
+        row(Tag='d', Topic='d', Station='4', Via='4'))
     assert problems == []
-    assert [mapping.via for mapping in mappings] == [10, 10, None, None]
+    assert [mapping.via for mapping in mappings] == [10, None, 10, None]
 
 
 @for_all(('cells', 'text'), [

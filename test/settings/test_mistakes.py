@@ -172,7 +172,7 @@ def test_what_is_odd_in_a_map(tmp_path: Path, text: str, expected: list[str]) ->
 
 
 def test_period_that_was_meant_as_seconds(tmp_path: Path) -> None:
-    told = told_of_map(tmp_path, f'{HEAD},Period\na,Read,N7:0,1,SLC,1\nb,Read,N7:1,1,SLC,100\n')
+    told = told_of_map(tmp_path, f'{HEAD},Period\na,Read,N7:0,1,SLC,1\nb,Read,N7:1,1,SLC,10\n')
     assert told[0] == '2:6 (Period): Period 1 is in ms; 1 s would be 1000'
     assert '3:6 (Period)' not in ' '.join(told)
 
