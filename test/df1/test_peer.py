@@ -22,7 +22,7 @@ from abdf1_ros.df1.frames import ACK, Duplex, ENQ, MAX_LINK_DATA, NAK, STX
 from abdf1_ros.df1.machine import LineTiming
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.settings import LinkSettings
-from abdf1_ros.errors import CommandTimeout, StationInactive
+from abdf1_ros.errors import CommandExpired, CommandTimeout, PortLost, StationInactive
 from abdf1_ros.messages import Message
 import pytest
 from support.cases import for_all
@@ -144,6 +144,19 @@ def test_whether_to_embed_is_found_out_anew_with_the_port() -> None:
     assert peer.machine.sender.embeds
     peer.start()
     assert not peer.machine.sender.embeds
+
+
+def test_command_whose_ack_the_port_does_not_take_is_not_executed_later() -> None:
+    def fail(data: bytes) -> None:
+        raise PortLost('unplugged')
+
+    peer = bench()
+    Wire(peer.machine, fail).attach(peer.now)
+    with pytest.raises(PortLost) as lost:
+        peer.hear_packet(THEIRS)
+    peer.machine.stop(lost.value)
+    peer.start()
+    assert (peer.hear(ENQ), peer.served) == (NAK, [])
 
 
 @pytest.mark.parametrize('begin', [STX, STX + bytes(261)])
@@ -284,15 +297,18 @@ def test_messages_of_the_vectors_get_their_response_and_commands_are_served(
         assert answer == ACK + peer.frame(entry.packet.reply())
 
 
-def test_command_that_has_left_is_asked_after_however_old_it_is() -> None:
+@pytest.mark.parametrize('response', [ACK, NAK])
+def test_command_that_has_left_is_asked_after_however_old_it_is(response: bytes) -> None:
     peer = bench()
     task = peer.add(COMMAND)
     task.expires = peer.now + 0.5
     peer.machine.wake(peer.now)
     peer.said()
     assert peer.wait(2.1) == [(1.0, ENQ), (2.0, ENQ)]
-    assert peer.hear(ACK) == b''
-    answer(peer, task)
+    assert peer.hear(response) == b''
+    peer.wait(CMD_TIMEOUT + 0.05)  # from the ACK on, not from the pause after it
+    error = CommandTimeout if response == ACK else CommandExpired
+    assert (type(task.result), task.sent) == (error, True)
 
 
 def test_reply_is_not_taken_after_its_time_although_nobody_has_looked() -> None:

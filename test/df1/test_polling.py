@@ -231,6 +231,18 @@ def test_message_that_is_late_for_its_poll_belongs_to_the_station_that_sends_it(
         assert (2510, 1, 5, 0x77) in rig.master.numbers()
 
 
+def test_command_that_was_late_for_its_poll_is_executed_when_it_comes_again() -> None:
+    rig = bench(PollingSettings((1, 2)), dead=(2,))
+    rig.start()
+    rig.line.run(lambda: 'P2' in rig.master.said, 1.0)
+    message = rig.message(1, 5)
+    late = message_frame(message.encode(), Checksum.CRC)
+    rig.master.machine.receive_data(late, rig.clock() + 0.05)
+    assert rig.master.served == []
+    rig.run(3.0)
+    assert rig.master.served == [message]
+
+
 def test_reply_that_was_taken_late_is_acknowledged_when_it_comes_again() -> None:
     rig = bench(PollingSettings((1, 2)), settings=replace(SETTINGS, enq_retries=3))
     setattr(rig.line, 'propagation', 0.06)

@@ -149,11 +149,12 @@ def test_command_that_has_become_too_old_is_not_repeated() -> None:
     task.expires = bench.now + 0.6
     assert len(bench.wait(30.0)) == 1
     assert isinstance(task.result, CommandExpired) and task.result.sent
-    old = bench.add(COMMAND._replace(tns=8))
-    old.expires = bench.now + 0.001
-    bench.machine.wake(bench.now)
-    assert bench.wait(30.0) == []
-    assert isinstance(old.result, CommandExpired) and not old.result.sent
+    for dst in (PLC, BROADCAST):
+        old = bench.add(COMMAND._replace(dst=dst, tns=8))
+        old.expires = bench.now + 0.001
+        bench.machine.wake(bench.now)
+        assert bench.wait(30.0) == []
+        assert isinstance(old.result, CommandExpired) and not (old.result.sent or old.sent)
 
 
 def test_repetition_is_known_whatever_many_others_have_sent_since() -> None:
@@ -171,6 +172,8 @@ def test_sender_that_always_counts_zero_is_served_after_a_while() -> None:
         bench.hear(framed(THEIRS._replace(tns=0)))
         bench.wait(1.0)
         assert bench.executed == {(PLC, 0): 1 + (count - 1) // 20}
+    bench.hear(framed(THEIRS._replace(tns=0, data=b'\x67\x02')))  # another command
+    assert bench.executed == {(PLC, 0): 5}
 
 
 def test_command_for_which_there_is_no_room_is_not_executed() -> None:
@@ -214,6 +217,8 @@ def test_vectors_are_executed_answered_or_dropped_as_they_say(entry: Vector) -> 
     assert len(replies) == (is_command and entry.packet.dst != BROADCAST)
     if entry.pair and is_command:  # up to the data
         assert replies[0][:8] == vector('radio_reply').frame[:8]
+    bench.hear(entry.frame)
+    assert bench.wait(1.0) == replies
 
 
 # Many nodes on the air

@@ -314,7 +314,8 @@ def test_check_is_found_though_silence_follows_each_message(
     commands = [COMMAND._replace(tns=count) for count in range(20)]
     session = TrafficDecoder(guess, is_certain=False)
     entries = decode([(OUT, message(command, checksum)) for command in commands], session, 1.0)
-    assert [entry.packet for entry in entries if entry.kind is Kind.COMMAND] == commands
+    assert [(entry.packet, entry.wire) for entry in entries if entry.kind is Kind.COMMAND] == [
+        (command, message(command, checksum)) for command in commands]
     assert session.kind.checksum is checksum
     assert Kind.NOISE not in kinds(entries)
 
