@@ -107,6 +107,7 @@ def test_what_is_written_is_read(port: str, station: int, plc_type: str | None) 
         plc.write(address='N7:8', values=numpy.array([3, 4], numpy.int16))
         plc.write('N7:10', numpy.float32(5.0))
         assert plc.read('N7:8', numpy.int64(3)) == [3, 4, 5]
+        assert plc.read('N7:10', 1) == [5]
         assert plc.read('T4:1.PRE') == 500
         assert plc.read('T4:0.ACC', 4) == [0, 0, 500, 0]  # to T4:1.ACC, past a control word
         assert plc.read('ST9:0') == 'recipe 7'
@@ -145,9 +146,10 @@ def test_errors_are_those_of_the_bridge(port: str) -> None:
         with pytest.raises(FormatError, match='station 300'):
             plc.read('N7:0', station=300)
     with client_with(port, timeout=0.1) as plc:
-        for ask, place in ((lambda: plc.read('N7:0', station=9), 'N7:0 of'),
-                           (lambda: plc.identify(station=9), 'status of')):
-            with pytest.raises(LinkError, match=f'^{place} station 9: 2509') as error:
+        for ask, place in ((lambda: plc.read('N7:0', station=9), 'N7:0 of station 9'),
+                           (lambda: plc.write('N7:0', 1, station=0), 'N7:0 of station 0'),
+                           (lambda: plc.identify(station=9), 'status of station 9')):
+            with pytest.raises(LinkError, match=f'^{place}: 2509') as error:
                 ask()
             assert error.value.words().startswith('2509')
 

@@ -19,6 +19,7 @@ import errno
 import os
 from pathlib import Path
 import pty
+import select
 import signal
 import subprocess
 import sys
@@ -129,10 +130,15 @@ def test_lines_that_nothing_takes_are_counted_and_told_when_they_are_taken_again
     while b'lost' not in text:
         text += os.read(reader, 65536).replace(b'\0', b'')
     sink.put(b'again\n')  # there is room for it now
+    while b'again' not in text:
+        text += os.read(reader, 65536)
+    sink.put(b'x' * 41)  # no line comes after it
+    assert select.select([reader], [], [], PATIENCE)[0]
     sink.end()
     sink.join(PATIENCE)
     text += os.read(reader, 65536)
-    assert text == b''.join(b'line %d\n' % number for number in range(5)) + LOST % 5 + b'again\n'
+    assert text == b''.join(
+        b'line %d\n' % number for number in range(5)) + LOST % 5 + b'again\n' + LOST % 1
     for descriptor in (reader, writer):
         os.close(descriptor)
 
@@ -177,13 +183,14 @@ def test_log_file_gets_no_colours(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
 def test_line_that_is_too_long_is_counted(tmp_path: Path) -> None:
     text = tmp_path / 'text'
-    text.write_bytes(b'before\n' + b'x' * 2_500_000 + b'\nafter')
-    reader, writer = os.pipe()
-    sink = Sink(writer)
-    with text.open('rb') as source:
-        pass_on(source.fileno(), [sink])
-    sink.start()
-    sink.join(PATIENCE)
-    assert os.read(reader, 1000) == b'before\n' + LOST % 2
-    for descriptor in (reader, writer):
-        os.close(descriptor)
+    for last in (b'after', b'after\n'):
+        text.write_bytes(b'before\n' + b'x' * 2_500_000 + b'\n' + last)
+        reader, writer = os.pipe()
+        sink = Sink(writer)
+        with text.open('rb') as source:
+            pass_on(source.fileno(), [sink])
+        sink.start()
+        sink.join(PATIENCE)
+        assert (os.read(reader, 1000), sink.is_alive()) == (b'before\n' + LOST % 2, False)
+        for descriptor in (reader, writer):
+            os.close(descriptor)
