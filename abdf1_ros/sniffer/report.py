@@ -117,10 +117,10 @@ def summary_lines(summary: Summary, kind: LineKind) -> Iterator[str]:
         (counts.kinds[Kind.NAK], 'NAK'), (counts.kinds[Kind.ENQ], 'ENQ'),
         (counts.marks[Mark.FORWARDED], 'forwarded'))
     yield '  faults: ' + _listed(
-        (counts.damaged, 'damaged'), (counts.noise, 'bytes of noise'),
-        (counts.marks[Mark.RETRANSMISSION], 'retransmissions'),
-        (counts.marks[Mark.DUPLICATE], 'duplicates'),
-        (counts.kinds[Kind.UNANSWERED], 'commands without reply'),
+        (counts.damaged, 'damaged'), (counts.noise, 'byte of noise'),
+        (counts.marks[Mark.RETRANSMISSION], 'retransmission'),
+        (counts.marks[Mark.DUPLICATE], 'duplicate'),
+        (counts.kinds[Kind.UNANSWERED], 'command without reply'),
         (counts.kinds[Kind.SILENCE], 'polls and messages without answer'))
     if counts.latency.count:
         yield (f'  replies after: mean {counts.latency.mean * 1000:.1f} ms, '
@@ -132,7 +132,8 @@ def _line_facts(summary: Summary, kind: LineKind) -> Iterator[str]:
     if summary.seconds is not None:
         yield f'{summary.seconds:.1f} s'
     ways = [f'{summary.bytes[way]} {way.value}' for way in Direction if summary.bytes[way]]
-    yield f'{summary.bytes.total()} bytes' + (f' ({", ".join(ways)})' if len(ways) > 1 else '')
+    sizes = f' ({", ".join(ways)})' if len(ways) > 1 else ''
+    yield counted(summary.bytes.total(), 'byte') + sizes
     if kind.duplex is not None:
         yield kind.duplex.value
     if kind.checksum is not None:
@@ -142,12 +143,17 @@ def _line_facts(summary: Summary, kind: LineKind) -> Iterator[str]:
         yield f'line load {load:.1%} at {summary.baud} baud'
 
 
-_NOUNS = 'command', 'reply', 'poll'
+_NOUNS = 'command', 'reply', 'poll', 'byte', 'retransmission', 'duplicate'
 
 
 def _listed(*entries: tuple[int, str]) -> str:
-    return ', '.join(counted(count, name) if name in _NOUNS else f'{count} {name}'
-                     for count, name in entries if count) or 'none'
+    return ', '.join(_counted(count, *name.split(' ', 1)) for count, name in entries if count) \
+        or 'none'
+
+
+def _counted(count: int, noun: str, rest: str = '') -> str:
+    text = counted(count, noun) if noun in _NOUNS else f'{count} {noun}'
+    return f'{text} {rest}'.rstrip()
 
 
 _COLUMNS = ('station', 'polls', 'silent', 'commands', 'replies', 'errors', 'damaged',

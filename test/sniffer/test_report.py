@@ -98,8 +98,8 @@ def test_summary_counts_what_was_seen_and_what_was_wrong(summary: Summary) -> No
     assert head == ('summary: 2.0 s, 960 bytes (600 >, 360 <), half duplex, CRC, '
                     'line load 50.0% at 9600 baud')
     assert seen == '  seen: 1 command, 2 replies, 1 of them with an error, 1 poll'
-    assert faults == ('  faults: 1 damaged, 2 bytes of noise, 1 retransmissions, '
-                      '1 duplicates, 1 polls and messages without answer')
+    assert faults == ('  faults: 1 damaged, 2 bytes of noise, 1 retransmission, '
+                      '1 duplicate, 1 polls and messages without answer')
     assert latency == '  replies after: mean 750.0 ms, max 750.0 ms'
     assert one.split() == ['1', '0', '0', '1', '2', '1', '1', '2', '0', '750.0', '750.0']
     assert sixteen.split() == ['16', '1', '1', *'000000', '-', '-']
@@ -122,7 +122,7 @@ def test_what_is_not_known_is_left_out() -> None:
     summary = Summary(9600)
     summary.take(Chunk(None, IN, b'x'))
     assert [*summary_lines(summary, LineKind(None, None))] == [
-        'summary: 1 bytes', '  seen: none', '  faults: none']
+        'summary: 1 byte', '  seen: none', '  faults: none']
     assert json.loads(json_line(POLL)) == {
         'direction': '?', 'kind': 'poll', 'station': 16, 'check': 'BCC', 'valid': True}
 
