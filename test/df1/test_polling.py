@@ -243,6 +243,21 @@ def test_command_that_was_late_for_its_poll_is_executed_when_it_comes_again() ->
     assert rig.master.served == [message]
 
 
+def test_reply_to_a_guest_that_cannot_be_fetched_does_not_make_its_station_inactive() -> None:
+    rig = bench(PollingSettings((1, 2)))
+    rig[1].delay = 0.1
+    task = rig.ask(1)
+    task.blames = False
+    rig.start()
+    rig.line.run(lambda: bool(rig[1].served), 1.0)
+    rig[1].silent = True
+    rig.line.run(lambda: ended(task), 1.0)
+    rig[1].silent = False
+    rig.run(1.0)
+    assert isinstance(task.result, StationInactive)
+    assert rig.master.changes == []
+
+
 def test_reply_that_was_taken_late_is_acknowledged_when_it_comes_again() -> None:
     rig = bench(PollingSettings((1, 2)), settings=replace(SETTINGS, enq_retries=3))
     setattr(rig.line, 'propagation', 0.06)

@@ -20,9 +20,10 @@ from abdf1_ros.df1.machine import LineTiming, Machine
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave, multidrop
-from abdf1_ros.errors import CommandExpired, CommandTimeout
+from abdf1_ros.errors import CommandExpired, CommandTimeout, PortLost
 import pytest
 from support.multidrop import SlaveBench
+from support.virtual_line import Wire
 
 US, MASTER, OTHER = 7, 5, 8
 SETTINGS = LinkSettings(station=US, nak_retries=2)
@@ -86,6 +87,7 @@ def test_broadcast_reaches_every_station() -> None:
     line = Line(7, 8)
     assert line.send(FROM_MASTER._replace(dst=BROADCAST)) == b''
     assert line.served == [7, 8]
+    assert line.say(master_frame(BROADCAST, FROM_MASTER.encode(), Checksum.CRC)) == b''
 
 
 def test_reply_with_an_error_is_counted_once() -> None:
@@ -167,6 +169,19 @@ def test_reply_to_another_node_does_not_make_ours_a_repetition() -> None:
     assert bench.hear(bench.frame(own().reply())) == ACK
     assert task.result == own().reply()
     assert bench.counts().get('duplicate_messages', 0) == 0
+
+
+def test_command_whose_ack_the_port_does_not_take_is_not_executed_later() -> None:
+    def fail(data: bytes) -> None:
+        raise PortLost('unplugged')
+
+    bench = SlaveBench(SETTINGS)
+    Wire(bench.machine, fail).attach(bench.now)
+    with pytest.raises(PortLost) as lost:
+        bench.hear(bench.frame(FROM_MASTER))
+    bench.machine.stop(lost.value)
+    bench.machine.start(bench.now)
+    assert (bench.poll(), bench.served) == (EOT, [])
 
 
 def test_command_for_a_node_behind_us_is_refused_and_counted() -> None:
