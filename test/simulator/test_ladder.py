@@ -136,7 +136,7 @@ def test_program_has_a_heartbeat_of_its_own_that_begins_anew(kind: type[Ladder])
     program.run(1.1)
     assert program.get('N11:3') - count == pytest.approx(10, abs=1)
     program.put('N11:3', 32000)
-    program.run(0.05)
+    program.run(0.02)
     assert program.get('N11:3') < 5
 
 
