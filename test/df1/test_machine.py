@@ -292,11 +292,12 @@ def test_what_was_heard_before_a_transmission_is_forgotten() -> None:
 def test_what_has_come_before_a_frame_could_leave_is_no_answer_to_it() -> None:
     bench = Bench(Send(FRAME, 1.0), Send(FRAME, 1.0), forget_on_send=True)
     bench.machine.data_to_send()
+    bench.machine.receive_data(b'\x55', 9.96)
     bench.machine.handle_timeout(10.0)  # after a pause of the process
     bench.machine.receive_data(EOT, 10.0)
     assert bench.got == [None]
     assert bench.machine.data_to_send() == FRAME
-    bench.machine.receive_data(ACK, 10.1)
+    bench.machine.receive_data(ACK, 10.04)
     assert bench.got == [None, SAID_ACK]
 
 
@@ -536,7 +537,7 @@ def test_command_that_expires_before_it_is_given_to_the_port_is_taken_back(embed
             yield Send(message_frame(bytes(200), Checksum.CRC), 1.0, expires=5.5)
         except CommandExpired:
             told.append('expired')
-        yield Send(ACK, 1.0)
+        told.append(type((yield Send(ACK, 1.0))).__name__)
 
     machine = Machine(run, checksum=Checksum.CRC, timing=LineTiming(0.01), duplex=Duplex.FULL)
     machine.start(5.0)
@@ -548,6 +549,8 @@ def test_command_that_expires_before_it_is_given_to_the_port_is_taken_back(embed
     assert machine.next_call == pytest.approx(6.0 + 1.0 + 0.02)
     machine.handle_timeout(6.05)
     assert machine.data_to_send() == b''
+    machine.receive_data(message_frame(bytes(200), Checksum.CRC), 6.1)  # not the echo of ours
+    assert told == ['expired', 'Frame']
 
 
 def test_command_that_is_taken_back_after_an_answer_to_another_ends_no_procedure() -> None:

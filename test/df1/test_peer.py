@@ -18,7 +18,7 @@ from collections.abc import Callable
 from typing import Any
 
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import ACK, Duplex, ENQ, MAX_LINK_DATA, NAK, STX
+from abdf1_ros.df1.frames import ACK, Duplex, ENQ, ETX, MAX_LINK_DATA, NAK, STX
 from abdf1_ros.df1.machine import LineTiming
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.settings import LinkSettings
@@ -140,6 +140,9 @@ def embedding(peer: PeerBench) -> None:
 
 def test_whether_to_embed_is_found_out_anew_with_the_port() -> None:
     peer = bench(timing=LineTiming(char_time=0.001))
+    damaged = peer.frame(THEIRS)[:5] + ACK + bytes(10) + ETX + bytes(2)
+    assert peer.hear(damaged) == NAK
+    assert not peer.machine.sender.embeds  # the ACK may be damage, too
     embedding(peer)
     assert peer.machine.sender.embeds
     peer.start()
