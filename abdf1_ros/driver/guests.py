@@ -257,8 +257,8 @@ class GuestQueue:
             if was_sent:
                 command.guest.listener.wrote(
                     command.guest, command.packet, station, list(claim.extents or ()))
-        self._stations.tried(station, begun, self.line.now, asker=Asker.MESSAGE,
-                             was_silent=not self._stations[station].replies_in_time)
+        self._stations.tried(
+            station, begun, self.line.now, asker=Asker.MESSAGE, was_silent=True)
 
     def _silent(self, station: int, now: float) -> None:
         """Treat a station that only guests ask as silent: no other command shows its silence."""

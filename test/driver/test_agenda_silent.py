@@ -125,14 +125,16 @@ def test_all_reads_are_due_when_the_line_is_back_and_none_of_them_twice() -> Non
 
 
 def test_station_that_is_back_is_not_read_twice_for_what_it_has_missed() -> None:
-    job = make_job()
+    job = make_job(period=125)
     bench = Bench(job)
     bench.stations.lost(1, 0.0)
     assert bench.next_read(0.0) is None
+    assert bench.read(6.0, took=PROBE_TIME) is job
+    assert bench.agenda.next_due() == 6.625  # no station replies: one try in a Period
     assert bench.next_read(8.0) is job
     bench.stations.heard(1, 8.01)
     bench.finish(job, 8.0, 8.02)
-    assert bench.agenda.next_due() == 8.1
+    assert bench.agenda.next_due() == 8.125
 
 
 def test_station_that_a_write_has_brought_back_has_its_reads_at_once() -> None:

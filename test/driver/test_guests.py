@@ -288,11 +288,13 @@ def test_a_flood_gets_a_reply_to_each_command(how_many: int) -> None:
 
 def test_silent_station_is_told_at_once_and_costs_others_little() -> None:
     bench = bench_of()
-    program = Program(bench)
+    bench.plc(2, 'SLC', ('N7:0', 20))
+    program, other = Program(bench), Program(bench, src=8)
+    other.go_on(lambda: other.ask(READ_N7, dst=2), pause=1.0)  # only guests ask this station
     program.keep_asking(READ_N7, dst=77)
     before = bench.driver.tasks.transactions
     run(bench, 10.0)
-    assert set(program.statuses) <= {0x02, 0x07}
+    assert set(program.statuses) <= {0x02, 0x07} and set(other.statuses) == {0x00}
     assert program.guest.unanswered == len(program.statuses)
     assert bench.listener.numbers() == {Message.NTC_REPLY_MSG_RCVD.number}
     # The probes of silent stations have an eighth of the line.

@@ -130,7 +130,11 @@ def test_rule_2_plc_behind_a_gateway_that_answers_at_all_is_a_first_contact(
     plc = cell.bench.driver.interlocks.plcs[1]
     beat, = plc.heartbeats
     assert not beat.wants_zero
-    plc.failures = 2
+    plc.failures = 1
+    ours = Claim(1, [beat.mapping.extent], beat.take(cell.now), cell.now - 0.5)
+    ours.end(Outcome.UNKNOWN, cell.now, 1.0)
+    plc.write_ended(ours, cell.now)
+    assert plc.pause_end == pytest.approx(cell.now + 7 * 0.5)
     claim = Claim(1, [beat.mapping.extent])
     claim.end(outcome, cell.now, -math.inf)
     plc.write_ended(claim, cell.now)

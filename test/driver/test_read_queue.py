@@ -217,6 +217,16 @@ def test_packets_that_took_too_long_together_are_no_value() -> None:
     assert job.is_unfinished  # due at once, and no call gets this for an answer
 
 
+def test_packet_that_a_call_wants_leaves_the_others_three_times_its_time() -> None:
+    long, other = make_job(length=236), make_job()
+    long.wanted = 0.0
+    queue, packet, taken = make_queue(other, long), block_time(long.block) / 2, []
+    for now in (0.0, 3.9 * packet, 4 * packet):
+        taken.append(job := queue.take(now))
+        queue.put(job, 0.0)
+    assert taken == [long, other, long]
+
+
 def test_long_read_begins_anew_after_an_error() -> None:
     job = make_job(length=236)
     assert not is_last_packet_read(job, 1.0)
