@@ -227,6 +227,13 @@ def test_youngest_message_is_the_one_published_last() -> None:
     assert bench.writes.youngest() == {row: 1.0}
 
 
+def test_change_gives_way_to_a_newer_one_after_half_the_time_that_it_may_wait() -> None:
+    bench, row = Bench(), make_mapping('B3:0/5', 'Write', fallback=Fallback((0,), 500))
+    writes = [bench.write(row, value, 0.0) for value in (1, 0, 1, 0)]
+    taken = [bench.next_write(now) for now in (0.125, 0.25, 0.375)]
+    assert taken == [writes[0], writes[1], writes[3]]
+
+
 def test_write_that_has_waited_too_long_is_not_sent() -> None:
     bench = Bench(write_timeout=2.0)
     bench.write(WORD, 1, 0.0)
@@ -241,7 +248,7 @@ def test_equal_messages_that_wait_as_one_write_end_each_at_its_time() -> None:
     bench = Bench(write_timeout=2.0)
     for published in (0.0, 0.25, 0.5):
         bench.write(BIT, 1, published)
-    for now, ended in ((2.1, 1), (2.3, 2), (2.5, 3)):
+    for now, ended in ((2.3, 2), (2.5, 3)):
         assert bench.begin_write(now, busy={1}) is None
         assert len(bench.results) == ended
 
@@ -349,6 +356,7 @@ def test_poll_cycle_is_that_of_the_slowest_job() -> None:
     one.done(60.0)
     one.done(60.25)
     assert (bench.reads.poll_cycle, bench.reads.longest_poll_cycle) == (0.25, 2.0)
+    assert one.intervals.usual == 0.5 + 0.125 * (0.25 - 0.5)
 
 
 # Functions, as hypothesis of Ubuntu 24.04 parses the source of a lambda at each step.

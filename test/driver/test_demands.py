@@ -89,16 +89,6 @@ def test_row_on_demand_takes_no_line_time_until_a_call_asks_for_it() -> None:
     assert line.driver.readings.blocks == [job.block for job in line.driver.readings.reads.jobs]
 
 
-def test_row_that_is_read_seldom_is_read_at_once() -> None:
-    line = Line(SPEED, run=6.0)
-    store(line.there, 'N12:0', [77])
-    begun = line.clock()
-    line.ask(SPEED, run=0.2)
-    (when, _, answer), = line.answers
-    assert (values_of(answer), when < begun + 0.1) == ([155.0], True)
-    assert line.listener.reads[-1][2] == [155.0]
-
-
 def test_row_that_was_asked_for_keeps_its_period_afterwards() -> None:
     line = Line(SPEED, make_mapping('N12:1', period=500), run=6.2)
     before = len(line.listener.values(SPEED))
@@ -318,7 +308,8 @@ def test_lost_port_and_the_end_answer_every_call() -> None:
     assert [*line.errors, fresh[0].error] == ['port lost: unplugged'] * 4
     assert line.driver.points[RECIPE].freshness(line.clock()) is Freshness.FRESH
     line.ask(RECIPE)
-    assert line.errors[-1] == 'the port is not open'
+    DriverBench([SPEED], start=False).driver.read_now(SPEED, fresh.append)
+    assert [line.errors[-1], fresh[-1].error] == ['the port is not open'] * 2
     line.open(run=1.0)
     assert line.listener.values(RECIPE) == line.listener.values(TABLE) == []
     line.driver.interlocks.wind_down()

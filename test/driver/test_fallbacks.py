@@ -535,16 +535,21 @@ def test_rule_8_0_that_a_guest_may_have_written_over_meanwhile_is_written_once_m
 def test_rule_10_heartbeat_counts_after_a_0_that_is_written_once_more() -> None:
     beat = HeartbeatRow(OneRow().record.words_of(beat_row()), 1, Random(0))
     beat.begin(0.0, is_new=True)
-    for now in (0.0, 0.3):
+    for now, outcome in ((0.0, Outcome.WRITTEN), (0.3, Outcome.UNKNOWN), (0.5, Outcome.WRITTEN)):
         assert beat.judge(now, '', now, {})
         assert beat.take(now).value == '[0]'
-        beat.ended(Outcome.WRITTEN, now + 0.1)
+        beat.ended(outcome, now + 0.1)
         beat.words.try_again(0.3 if now < 0.3 else math.inf, now + 0.1)
-    assert not beat.read_back(5, 0.39, 0.5)  # that read began before the 0 was confirmed
-    assert not beat.judge(0.8, '', 0.8, {})  # the 0 stands for half a second
-    assert beat.judge(0.95, '', 0.95, {})
-    assert beat.take(0.95).value == '[1]'
+    assert not beat.read_back(5, 0.59, 0.7)  # that read began before the 0 was confirmed
+    assert not beat.judge(1.0, '', 1.0, {})  # the 0 stands for half a second
+    assert beat.judge(1.15, '', 1.15, {})
+    assert (beat.take(1.15).value, beat.tries) == ('[1]', 4)
     assert not beat.judge(9.0, '', 9.0, {})  # under way
+    beat.ended(Outcome.WRITTEN, 9.0)
+    assert beat.read_back(5, 9.0, 9.0).endswith('probably a download')
+    beat.take(9.0)
+    beat.ended(Outcome.WRITTEN, 9.0)
+    assert beat.next_beat == 9.0 + 0.5 + 0.2 * Random(0).randint(1, 7)  # unlike another bridge
 
 
 def test_rule_10_why_the_plc_refuses_is_told_once() -> None:
@@ -594,6 +599,8 @@ def test_rule_10_refresh_is_not_the_second_write(outcome: Outcome, next_refresh:
     assert not row.judge(7.0, -math.inf)
     assert row.due == 10.0
     assert row.refresh_at == next_refresh
+    one.fallback(row.take(10.0), 10.5, Outcome.UNKNOWN)  # nor is it tried all the time
+    assert (row.judge(10.5, -math.inf), row.due) == (False, 11.5)
 
 
 def test_rule_10_first_try_is_not_held_up_by_the_pause_of_another_row() -> None:

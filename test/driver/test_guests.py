@@ -24,7 +24,7 @@ from abdf1_ros.driver.guests import Guest, GuestCommand, GuestListener, outcome_
 from abdf1_ros.driver.interlocks.heartbeat import BeatState
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome
-from abdf1_ros.errors import CommandExpired, CommandTimeout
+from abdf1_ros.errors import CommandExpired, CommandTimeout, PortLost
 from abdf1_ros.messages import Message
 from abdf1_ros.pccc.extent import Extent
 from abdf1_ros.plan.bounds import OURS_BESIDE_GUESTS
@@ -116,7 +116,9 @@ def test_command_that_has_become_too_old_after_it_was_taken_is_not_sent() -> Non
     program = Program(bench, ShareAccess.WRITE)
     program.ask(WRITE_N7)
     guests = bench.driver.guests
-    guests.put(GuestCommand(program.guest, Packet(1, 9, 0x0F, 0, 1, READ_N7), 1.5, print))
+    later: list[Packet] = []
+    guests.put(GuestCommand(
+        program.guest, Packet(1, 9, 0x0F, 0, 1, READ_N7), 1.5, later.append))
     guests.expire(bench.clock())
     first = guests.next_expiry  # of two that wait
     job = guests.next(bench.clock(), ())
@@ -125,6 +127,10 @@ def test_command_that_has_become_too_old_after_it_was_taken_is_not_sent() -> Non
     program.guest.listener = told = Told()
     job.ended(CommandExpired(sent=False))
     assert (program.statuses, told.words) == ([0x01], [])
+    job = guests.next(bench.clock(), ())
+    assert job is not None
+    job.ended(PortLost('unplugged', sent=False))
+    assert [reply.sts for reply in later] == [0x04]
 
 
 def test_what_is_not_allowed_is_refused_at_once_and_changes_nothing() -> None:
@@ -396,8 +402,10 @@ def test_lost_port_is_told_and_what_waits_is_not_sent_later() -> None:
         program.guest, Packet(1, 9, 0x0F, 0, 1, READ_N7), bench.clock(), fresh.append))
     bench.lose_port()
     assert [reply.sts for reply in fresh] == [0x04]
-    program.ask(READ_N7)
-    assert len(program.replies) == 3
+    early = Program(DriverBench([], start=False))
+    for each in (program, early):
+        each.ask(READ_N7)
+    assert (len(program.replies), early.statuses) == (3, [0x04])
     assert set(program.statuses) <= {0x04, 0x05}
     bench.open(run=2.0)
     assert len(program.replies) == 3

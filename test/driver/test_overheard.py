@@ -295,12 +295,12 @@ def test_run_holds_only_from_a_status_reply_that_was_heard() -> None:
 def test_counter_that_is_heard_to_change_guards_a_row() -> None:
     counter = row('N9:0', 1, tag='counter')
     mapping = row(length=4, condition=While(('counter',), 2000))
-    bench = ListeningBench([counter, mapping])
-    for number in range(4):
-        exchange(bench, number, 'A2 02 09 89 00 00', f'0{number} 00')
+    bench = ListeningBench([counter, mapping, row('N9:1', 1)])
+    for number in range(7):
+        exchange(bench, number, 'A2 04 09 89 00 00', f'0{max(number, 3)} 00 0{number} 00')
         exchange(bench, 50 + number, READ_N7_0, VALUES)
         bench.run(0.5)
-    assert (len(bench.values(counter)), len(bench.values(mapping))) == (4, 2)
+    assert (len(bench.values(counter)), len(bench.values(mapping))) == (7, 2)
 
 
 def test_read_now_is_refused() -> None:

@@ -114,14 +114,6 @@ def test_first_text_is_published_though_it_is_empty() -> None:
     assert point('Change', text='ST9:0').update(bytes(84), 0.0) == ''
 
 
-def test_first_good_read_after_an_outage_is_published_though_nothing_changed() -> None:
-    changing = point('Change')
-    changing.update(b'\1\0', 0.0)
-    changing.fail('cable')
-    assert changing.update(b'\1\0', 1.0) == array('h', [1])
-    assert changing.update(b'\1\0', 2.0) is None
-
-
 def test_words_that_are_no_value_are_not_published_and_do_not_count_as_the_last() -> None:
     digits = ReadPoint(make_mapping(kind='bcd16', publish='Change'), 0.1, 0.6)
     digits.update(b'\x12\0', 0.0)

@@ -264,9 +264,10 @@ def test_whole_element_of_which_a_word_is_served(plc: str, access: str) -> None:
     assert bench.ask(*dialect.read(parse_address('T4:2', PlcType(plc)), 3))[0] != 0
 
 
-@pytest.mark.parametrize(('text', 'words'), [('T4:0.PRE', 3), ('T4:0', 5)])
+@pytest.mark.parametrize(('text', 'words'), [('T4:0.PRE', 3), ('T4:0', 5), ('T4:1', 9)])
 def test_words_that_are_no_whole_elements_are_all_mapped_or_refused(text: str, words: int) -> None:
-    bench = Bench('SLC', row('T4:0.ACC', 'SLC'), row('T4:1.PRE', 'SLC'))
+    bench = Bench('SLC', *(
+        row(address, 'SLC') for address in ('T4:0.ACC', 'T4:1.PRE', 'T4:3.PRE')))
     dialect = dialect_of(PlcType.SLC)
     assert bench.ask(*dialect.read(parse_address(text, PlcType.SLC), words))[0] != 0
     assert bench.ask(*dialect.read(parse_address('T4:0', PlcType.SLC), 6))[0] == 0
