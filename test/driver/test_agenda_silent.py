@@ -27,9 +27,9 @@ from support.mappings import make_mapping
 
 
 def test_reads_of_an_inactive_station_are_set_aside() -> None:
-    dead, living = make_job(station=1), make_job('N9:0', station=2)
+    dead, living = make_job(station=1, period=9000), make_job('N9:0', station=2)
     bench = Bench(dead, living)
-    assert bench.next_read(0.0) is dead
+    assert (bench.read(0.0), bench.next_read(0.0)) == (living, dead)
     for when in (0.1, 0.2):
         dead.done(when)
     bench.stations.lost(1, 0.5)
@@ -100,6 +100,7 @@ def test_station_that_has_replied_once_goes_first_after_a_death() -> None:
     bench = Bench(make_job(station=1), proven := make_job(station=2))
     bench.stations[2].replies = 1
     bench.stations.probes.died(PROBE_TIME, 0.0)
+    assert bench.agenda.next(0.0, {1, 2}) is None
     assert bench.next(0.0) is proven
 
 

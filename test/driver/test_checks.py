@@ -316,13 +316,6 @@ def test_check_of_a_station_that_is_back_is_no_probe() -> None:
     assert are_probes() == [False]
 
 
-def test_broadcast_is_no_station_to_be_watched() -> None:
-    bench = DriverBench([word(255, 'Write')], settings=DriverSettings(processor_period=1.0))
-    bench.run(10.0)
-    assert bench.driver.counters.commands_sent == 0
-    assert bench.driver.next_due() == math.inf
-
-
 def test_dead_station_with_reads_is_not_forgotten_for_those_without() -> None:
     alive = word(1, period=0)
     dead = [word(2), *(word(station, 'Write') for station in range(3, 9))]

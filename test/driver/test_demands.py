@@ -99,7 +99,7 @@ def test_row_that_was_asked_for_keeps_its_period_afterwards() -> None:
 
 def test_answer_is_never_older_than_the_call() -> None:
     """A read that had begun does not count: the value may have changed since."""
-    line = Line(SPEED, run=6.0)
+    line = Line(SPEED, make_mapping('N12:1', period=5000), run=6.0)
     line.ask(SPEED)
     line.run(0.02)  # the PLC has executed its command, and the reply is under way
     store(line.there, 'N12:0', [78])

@@ -157,19 +157,6 @@ def test_message_of_the_plc_appears_at_once(family: str, check: str) -> None:
     assert counters.error_messages_sent == counters.duplicate_messages == 0
 
 
-def test_message_to_what_is_not_served_is_refused() -> None:
-    bench = Bench([serve_row('N7:50', length=4)])
-    bench.open()
-    bench.message('N7:54', 1)
-    bench.message('N7:0', 1)
-    bench.message('N10:0', 1)
-    bench.run(1.0)
-    assert [text.partition(':')[0] for text in bench.said] == [
-        'STS F0 EXT STS 07', 'STS F0 EXT STS 07', 'STS F0 EXT STS 06']
-    assert bench.listener.reads == []
-    assert bench.driver.counters.error_messages_sent == 3
-
-
 @pytest.mark.parametrize('family', ['PLC3', 'PLC5', 'SLC'])
 def test_what_ros_writes_is_read_by_the_plc(family: str) -> None:
     words, bits = serve_row('N7:50', family, 4), serve_row('B3:5/4', family, 4)
@@ -239,12 +226,6 @@ def test_dead_line_fails_reads_and_writes_and_all_goes_on_when_it_is_back() -> N
     bench.message('N7:50', 9)
     bench.run(1.0)
     assert bench.listener.values(pushed) == [[9]]
-
-
-def test_our_own_station_is_no_station_of_the_line() -> None:
-    bench = Bench([serve_row('N7:50'), make_mapping()])
-    assert [station.number for station in bench.driver.stations] == [PLC]
-    assert len(bench.driver.readings.blocks) == 1
 
 
 def test_served_word_that_nobody_has_to_write_is_not_late() -> None:

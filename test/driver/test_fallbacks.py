@@ -651,6 +651,21 @@ def test_rule_10_pause_of_this_process_does_not_put_off_a_silent_plc() -> None:
     assert line.driver.stations[2].active
 
 
+def test_rule_11_first_tries_at_a_silent_plc_and_reads_take_turns_on_a_full_line() -> None:
+    speeds = [make_mapping(f'N7:{number}', 'Write', tag=f'speed{number}', fallback=FALLBACK)
+              for number in range(3)]
+    line = Line([*speeds, read := make_mapping('N7:0', station=2, period=0)], (1, 2))
+    line.run(1.0)
+    for speed in speeds:
+        line.write(speed, [3])
+    line.run(0.3)
+    line.far_stations[0].faults.silent = True
+    line.run(2.0)
+    assert all(row.sent > row.refreshed for row in line.driver.interlocks.fallbacks)
+    first, second, _ = sorted(row.sent for row in line.driver.interlocks.fallbacks)
+    assert any(first < when <= second for when in line.listener.times(read))
+
+
 def test_rule_11_flood_of_bits_does_not_delay_beats_nor_starve_reads() -> None:
     bit, read = make_mapping('B3:0/0', 'Write'), make_mapping('N11:0', period=100)
     cell = Cell(beat_row(period=200), bit, read, run=1.0)
