@@ -311,11 +311,13 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
                         help='half duplex: the adapter echoes the bytes that we send')
     add_line_options(parser, LineDefaults(), duplex=False)
     options = parser.parse_args(args)
-    if options.echo and not Target(options.target).is_half_duplex:
+    target = Target(options.target)
+    if options.echo and not target.is_half_duplex:
         parser.error('--echo: in full duplex an echo looks like an answer')
-    unknown = set(options.only) - {case.name for case in CASES}
+    unknown = set(options.only) - {case.name for case in CASES if target in case.targets}
     if unknown:
-        parser.error(f'--only {", ".join(sorted(unknown))}: no such case; --list shows them')
+        parser.error(f'--only {", ".join(sorted(unknown))}: no such case of target '
+                     f'{target.value}; --list shows them')
     if not 0 <= options.station <= MAX_STATION:
         parser.error(f'--station {options.station} should be from 0 to {MAX_STATION}')
     if not 1 <= options.count <= 100:

@@ -112,6 +112,12 @@ def test_failures_skips_noise_and_early_enquiries_are_told(
         assert '--answer-time 1 that may look like a fault: try --answer-time 0.3\n' in said.err
 
 
+def test_processor_of_another_family_is_not_read(tmp_path: Path, capsys: Output) -> None:
+    with plc_line(tmp_path / 'plc', simulated_plc(1, 'PLC2', time.monotonic)) as port:
+        assert main(['slave', '--port', port, '--only', 'read-words']) == 1
+    assert 'skipped: needs --family PLC5 or SLC' in capsys.readouterr().out
+
+
 def test_nobody_there_is_said(tmp_path: Path, capsys: Output) -> None:
     dead = Pty(tmp_path / 'dead')
     assert main(['slave', '--port', str(dead.name), '--answer-time', '0.05', '--only',
@@ -186,20 +192,18 @@ def test_port_that_cannot_be_opened_is_one_and_what_is_wrong_in_options_two(
 
 
 @for_all('args', [
-    ['slave', '--only', 'nothing'], ['slave', '--station', '255'], ['slave', '--count', '0'],
-    ['slave', '--count', '101'], ['slave', '--tcp', 'nowhere'], ['slave', '--tcp', 'a:99999'],
-    ['peer', '--words', 'F8:0'], ['peer', '--echo'], []])
+    ['slave', '--only', 'nothing'], ['slave', '--only', 'nak-limit'],  # which is one of a peer
+    ['slave', '--station', '255'], ['slave', '--count', '0'], ['slave', '--count', '101'],
+    ['slave', '--tcp', 'nowhere'], ['slave', '--tcp', 'a:99999'],
+    ['peer', '--words', 'F8:0'], ['peer', '--echo'], ['slave', '--duplex', 'half'], []])
 def test_usage_is_shown_for_impossible_options(args: list[str]) -> None:
     with pytest.raises(SystemExit) as end:
         main(args)
     assert end.value.code == 2
 
 
-@pytest.mark.parametrize('args', [('--station', '0'), ('--station', '254'), ('--count', '100')])
-def test_numbers_up_to_their_bounds_are_taken(args: tuple[str, str]) -> None:
-    assert main(['slave', '--list', *args]) == 0
-
-
-def test_cases_are_listed(capsys: Output) -> None:
-    assert main(['client', '--list']) == 0
+@for_all('args', [('--station', '0'), ('--station', '254'), ('--count', '100')])
+def test_cases_are_listed_and_numbers_up_to_their_bounds_are_taken(
+        args: tuple[str, str], capsys: Output) -> None:
+    assert main(['client', '--list', *args]) == 0
     assert 'silence-enquired' in capsys.readouterr().out

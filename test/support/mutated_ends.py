@@ -858,8 +858,9 @@ class MutatedRadioClient(_Radio):
         mine = self._command
         if is_ours and data[1] == mine[0] and self._asker.is_reply(data, mine) or \
                 self.has(Habit.TAKES_ANY_REPLY):
-            self._command = bytes(6)  # nothing is waited for
-            self.then(0.15, self._ask)
+            is_again = self.has(Habit.REPEATS_AFTER_ACK)
+            self._command = mine if is_again else bytes(6)  # nothing is waited for
+            self.then(0.15, self._try if is_again else self._ask)
 
 
 class MutatedMaster(Wire):
