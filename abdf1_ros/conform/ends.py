@@ -323,7 +323,13 @@ class AnsweringEnd(ABC):
 
     def __init__(self, wire: Wire, serve: Serve) -> None:
         self.wire = wire
-        self.serve = serve
+        self._serve = serve
+
+    def serve(self, command: bytes) -> bytes:
+        """Execute a command, and return its reply; raise Failed if it has no whole header."""
+        if len(command) < codec.HEADER_SIZE:
+            raise Failed(f'a command of {codec.HEADER_SIZE} bytes or more', command.hex(' '))
+        return self._serve(command)
 
     def settle(self) -> None:
         """Answer one command, so that the target does not count us as inactive in the case."""

@@ -14,6 +14,8 @@
 
 """Each fault of an end is found by the case that names its rule; what is allowed passes."""
 
+from collections.abc import Callable
+
 from abdf1_ros.conform import codec
 from abdf1_ros.conform.case import CaseResult, Target, Verdict
 from abdf1_ros.conform.cases import CASES
@@ -93,9 +95,11 @@ FAULTS = [(target, habit, name) for targets, habit, name in [
     ((Target.CLIENT, Target.MASTER), Habit.TAKES_ANY_TNS, 'other-reply-ignored'),
     ((Target.CLIENT, Target.MASTER), Habit.TAKES_ANY_DESTINATION, 'other-reply-ignored'),
     ((Target.MASTER,), Habit.ACKS_BAD_REPLY, 'bad-reply-polled-again'),
+    ((Target.MASTER,), Habit.IGNORES_BAD_CHECK, 'bad-reply-polled-again'),
     ((Target.MASTER,), Habit.NAK_BEFORE_COMMAND, 'no-needless-reset'),
     ((Target.MASTER,), Habit.REPEATS_FOR_EVER, 'repetitions-limited'),
     (ASKING, Habit.DOUBLES_CHECK, 'check-not-doubled'),
+    (ASKING, Habit.TAKES_SHORT, 'command-form'),
     ((Target.SLAVE,), Habit.TAKES_BAD_CHECK, 'bad-check-ignored'),
     ((Target.SLAVE,), Habit.NAKS_BAD_CHECK, 'bad-check-ignored'),
     ((Target.SLAVE,), Habit.CRC_WITHOUT_STATION, 'crc-covers-station'),
@@ -124,6 +128,7 @@ FAULTS = [(target, habit, name) for targets, habit, name in [
     ((Target.PEER,), Habit.ENQ_NOT_ANSWERED, 'enquiry-after-ack'),
     ((Target.PEER,), Habit.NO_REPETITION, 'reply-repeated-after-nak'),
     ((Target.PEER,), Habit.SILENCE_REPEATED, 'silence-is-enquired'),
+    ((Target.PEER,), Habit.SILENCE_REPEATED, 'enquiry-limit'),
     ((Target.PEER,), Habit.RESPONSE_IS_DATA, 'embedded-response'),
     ((Target.PEER,), Habit.RESPONSE_INSIDE_IGNORED, 'embedded-response'),
     ((Target.PEER,), Habit.ENQUIRES_ALWAYS, 'no-needless-enquiry'),
@@ -182,6 +187,27 @@ FAULTS = [(target, habit, name) for targets, habit, name in [
     (SENDER, Habit.SENDS_ON_OWN, 'own-command-dropped'),
 ] for target in targets]
 
+# What is told of some of them: expected, and got.
+TOLD = {
+    (Target.SLAVE, Habit.NO_ACK): ('DLE ACK for a good message', 'silence'),
+    (Target.SLAVE, Habit.BAD_CHECK_OF_HIGH_BYTES): (
+        'a message or DLE EOT as answer to a poll', 'a message with a wrong check'),
+    (Target.PEER, Habit.BAD_CHECK_OF_HIGH_BYTES): ('the reply', 'a message with a wrong check'),
+    (Target.PEER, Habit.EXCHANGES_TNS): (
+        'a reply 05 01 46 STS 10 00 to this command', '05 01 46 00 00 10'),
+    (Target.SLAVE, Habit.DOES_ALL_FUNCTIONS): ('STS 10 or STS F0', 'STS 00'),
+    (Target.SLAVE, Habit.WORDS_REVERSED): ('01 80 in N7:2', '05 82'),
+    (Target.PEER, Habit.IGNORES_BAD_CHECK): ('DLE NAK', 'silence'),
+    (Target.PEER, Habit.NAK_AS_0F): ('DLE NAK', 'bytes outside of any symbol'),
+    (Target.PEER, Habit.ENQ_ALWAYS_NAK): ('DLE ACK', 'DLE NAK'),
+    (Target.PEER, Habit.EMBEDDED_NAK_IGNORED): (
+        'the reply again that was refused', 'DLE ACK, DLE ENQ'),
+    (Target.MASTER, Habit.TAKES_ANY_TNS): (
+        'no new command for 5.1 s, as after no reply', 'the next command after 0.05 s'),
+    (Target.MASTER, Habit.NAK_BEFORE_COMMAND): (
+        'no DLE NAK while all is answered', '4 beside 4 commands'),
+    (Target.CLIENT, Habit.SAME_TNS): ('three different TNS', '34 12, 34 12, 34 12')}
+
 # What the manual allows, or leaves to a setting, and the cases that cannot be judged then.
 ALLOWED = [(target, habit, names) for targets, habit, names in [
     (ALL, Habit.SLOW, set()),
@@ -225,7 +251,9 @@ def test_fault_is_found_by_the_case_that_names_it(fault: tuple[Target, Habit, st
     for words in end.files:
         words[:] = b'\7' * len(words)
     result, = results_of(end, target, 'CRC', only=name)
-    assert result.verdict is Verdict.FAIL
+    assert result.verdict is Verdict.FAIL and result.transcript
+    told = result.expected, result.got
+    assert told == TOLD.get((target, habit), told)
     # the case has restored the words of the PLC
     assert habit is Habit.MASK_CHANGES_NEXT_WORD or set().union(*end.files) <= {7}
 
@@ -358,12 +386,14 @@ def test_numbers_of_commands_begin_again_after_the_last() -> None:
     assert [end.command()[4:6] for _ in range(2)] == [b'\xFF\xFF', b'\0\0']
 
 
+@for_all('wait', [SlaveEnd.next_command, SlaveEnd.next_poll])
 @for_all('raw', [codec.poll(7), codec.master_message(7, bytes(8), BlockCheck.CRC)])
-def test_what_is_for_another_slave_is_neither_answered_nor_taken(raw: bytes) -> None:
+def test_what_is_for_another_slave_is_neither_answered_nor_taken(
+        raw: bytes, wait: Callable[[SlaveEnd, str], Symbol]) -> None:
     line = Babble(raw)
     end = SlaveEnd(Wire(line, BlockCheck.CRC, line.clock, is_half_duplex=True), 1, bytes)
-    with pytest.raises(Failed):
-        end.next_command('a command')
+    with pytest.raises(Failed, match='expected it, got nothing of the kind in 30 s'):
+        wait(end, 'it')
     assert line.sent == b''
 
 

@@ -687,7 +687,8 @@ class _Asker:
         if self._wire.has(Habit.STOPS_AFTER_10) and self._tns > 0x123E:
             return b''
         sts = 2 if self._wire.has(Habit.STS_IN_COMMAND) else 0
-        return self.with_tns(bytes((1, 5, 0x0F, sts, 0, 0)) + _PLC5_READ)
+        command = self.with_tns(bytes((1, 5, 0x0F, sts, 0, 0)) + _PLC5_READ)
+        return command[:2] if self._wire.has(Habit.TAKES_SHORT) else command
 
     def with_tns(self, command: bytes) -> bytes:
         """Return a command with the newest TNS."""
@@ -909,6 +910,12 @@ class MutatedMaster(Wire):
                 yield _ACK_TIMEOUT
         return False
 
+    def _refuse(self) -> Generator[float, Symbol | None, None]:
+        if self.has(Habit.ACKS_BAD_REPLY):
+            self.say(bytes((_DLE, _ACK)))
+        if self.has(Habit.IGNORES_BAD_CHECK):
+            yield 1e6
+
     def _fetched(self, command: bytes) -> Generator[float, Symbol | None, None]:
         silent = 0
         end = self.now + _COMMAND_TIMEOUT
@@ -935,8 +942,7 @@ class MutatedMaster(Wire):
                     if is_ours:
                         return
                     continue
-                if self.has(Habit.ACKS_BAD_REPLY):
-                    self.say(bytes((_DLE, _ACK)))
+                yield from self._refuse()
                 if self.has(Habit.NAKS_BAD_REPLY):
                     self.say(bytes((_DLE, _NAK)))
                     return
