@@ -40,10 +40,10 @@ CHECKS = ['BCC', 'CRC']
 ASKING = {Target.MASTER: 'Master', Target.CLIENT: 'Peer', Target.RADIO_CLIENT: 'Radio'}
 
 
-def asking(check: str, mode: str) -> ScriptedLine:
+def asking(check: str, mode: str, polling: str = 'Message') -> ScriptedLine:
     """Return a line with a driver at its end that reads station 1 all the time."""
-    network = Network(mode=mode, error_code=check, baud=115200, timeout=300, cmd_timeout=2000,
-                      station=5)
+    network = Network(mode=mode, polling=polling, error_code=check, baud=115200, timeout=300,
+                      cmd_timeout=2000, station=5)
     listener = Recorder(lambda: 0.0)
     driver = Driver(network, [make_mapping('N7:0', length=2, period=0)],
                     DriverSettings(processor_period=0), listener)
@@ -75,9 +75,11 @@ def test_simulated_plc_conforms(target: Target, family: str, check: str) -> None
 
 
 @pytest.mark.parametrize('check', CHECKS)
-@pytest.mark.parametrize(('target', 'mode'), ASKING.items())
-def test_our_driver_passes_every_case(target: Target, mode: str, check: str) -> None:
-    results = results_of(asking(check, mode), target, check)
+@pytest.mark.parametrize(('target', 'mode', 'polling'), [
+    *((*asked, 'Message') for asked in ASKING.items()), (Target.MASTER, 'Master', 'Standard')])
+def test_our_driver_passes_every_case(
+        target: Target, mode: str, polling: str, check: str) -> None:
+    results = results_of(asking(check, mode, polling), target, check)
     assert failures(results) == []
     assert {result.verdict for result in results} == {Verdict.PASS}
 

@@ -181,6 +181,7 @@ FAULTS = [(target, habit, name) for targets, habit, name in [
     (SENDER, Habit.REPEATS_AFTER_ACK, 'check-not-doubled'),
     (SENDER, Habit.ACKNOWLEDGES, 'duplicate-reply-ignored'),
     (SENDER, Habit.SILENCE_REPEATED, 'silence-not-enquired'),
+    (SENDER, Habit.REPEATS_CUT, 'silence-not-enquired'),
     (SENDER, Habit.TAKES_BAD_CHECK, 'bad-reply-ignored'),
     (SENDER, Habit.NAKS_BAD_CHECK, 'bad-reply-ignored'),
     (SENDER, Habit.TAKES_ANY_REPLY, 'other-reply-ignored'),
@@ -378,6 +379,9 @@ def test_wait_for_a_symbol_ends_though_others_come_for_ever() -> None:
     assert wire.noise > 0
     line.data = b''
     assert wire.hear(0.1) is None and wire.has_heard
+    said = [codec.ACK, b'\x55']
+    line.read = lambda timeout: said.pop()  # type: ignore[method-assign]
+    assert wire.expect(SymbolKind.ACK).raw == codec.ACK
 
 
 def test_numbers_of_commands_begin_again_after_the_last() -> None:

@@ -850,6 +850,8 @@ class MutatedRadioClient(_Radio):
             return self._ask()
         self._tries += 1
         self.say(self.frame(self._command))
+        if self.has(Habit.REPEATS_CUT):
+            self._command = self._command[:-1]
         if self.has(Habit.SILENCE_REPEATED):
             self.say(bytes((_DLE, _ENQ)), 1.0)
         self.then(_COMMAND_TIMEOUT, self._try)
