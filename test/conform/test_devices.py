@@ -138,18 +138,6 @@ class OddLine:
         return data
 
 
-@pytest.mark.parametrize('behaviour, case', [
-    ('waits_for_poll', 'reply-waits-for-poll'), ('knows_commands', 'read-words')])
-def test_slave_without_a_behaviour_fails_its_case(behaviour: str, case: str) -> None:
-    def verdict(has_it: bool) -> Verdict:
-        device = OddDevice(Wiring.HALF)
-        setattr(device, behaviour, has_it)
-        result, = results_of(OddLine(device), Target.SLAVE, 'CRC', only=case)
-        return result.verdict
-
-    assert (verdict(True), verdict(False)) == (Verdict.PASS, Verdict.FAIL)
-
-
 def test_answer_of_unknown_symbols_is_not_silence() -> None:
     """Noise is passed over; DLE with a code that no symbol has is something that was said."""
     device = OddDevice(Wiring.HALF)
