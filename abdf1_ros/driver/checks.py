@@ -185,6 +185,7 @@ class Checks:
     def went_away(self, station: int) -> None:
         """Forget the reports of a station that does not answer any more."""
         self._forget(station, 'the station does not answer')
+        self.ask_status(station, math.inf)
 
     def find_due(self, now: float) -> bool:
         """Take new requests; return True if a check is due."""
