@@ -192,7 +192,9 @@ def test_refusal_or_reply_that_is_no_status_is_told_and_no_fault_of_the_station(
     assert bench.driver.checks.known(1).identity is not None
     ears.answer_diagnostics(lambda command: command.reply(b'\x06'))
     bench.run(PERIOD)
-    assert bench.driver.checks.known(1).processor == 'unknown (a diagnostic status of 1 bytes)'
+    known = bench.driver.checks.known(1)
+    assert (known.processor, known.identity, known.told) == (
+        'unknown (a diagnostic status of 1 bytes)', None, None)
 
 
 def test_station_that_never_answers_this_is_asked_rarely() -> None:

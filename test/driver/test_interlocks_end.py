@@ -20,7 +20,7 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.writes.under_way import WriteJob
 from abdf1_ros.settings.heartbeats import Fallback, LAST_ANSWER
 import pytest
-from support.interlocks import beat_row, Cell, END, end, FALLBACK, speed_row
+from support.interlocks import beat_row, Cell, END, end, FALLBACK, Line, speed_row
 from support.mappings import make_mapping
 
 
@@ -162,6 +162,21 @@ def test_rule_5_end_asks_a_silent_plc_at_once_where_another_answers() -> None:
     cell.bench.line.wake(cell.bench.driver.machine)
     cell.run(1.5)
     assert (cell.word('N10:0'), cell.word('N7:0')) == (0, 7)
+
+
+def test_rule_5_end_asks_a_silent_plc_too_where_another_has_its_own_rows() -> None:
+    rows = [make_mapping('N7:0', 'Write', station=number, tag=f'speed{number}',
+                         fallback=Fallback((7,), 5000)) for number in (1, 2)]
+    line = Line([*rows, make_mapping('N7:9')], (1, 2))
+    line.run(1.0)
+    for row in rows:
+        line.write(row, [3], run=0.1)
+    line.far_stations[0].faults.silent = True
+    line.run(1.0)
+    line.driver.interlocks.wind_down()
+    line.line.wake(line.driver.machine)
+    line.run_until(lambda: line.driver.interlocks.is_over, 2.0)
+    assert line.driver.interlocks.unconfirmed() == ['speed1']
 
 
 @pytest.mark.parametrize(('ends', 'answer_within'), [(False, math.inf), (True, LAST_ANSWER)])

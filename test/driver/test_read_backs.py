@@ -118,6 +118,7 @@ def test_read_that_began_before_the_write_ended_says_nothing() -> None:
     mapping = make_mapping('N7:0', 'ReadWrite')
     unconfirmed = Unconfirmed(mapping, mapping, [5])
     unconfirmed.read(b'\5\0', EARLY - 0.001)
+    unconfirmed.backs.words_read(block_of(make_mapping('N9:0')), b'\5\0', EARLY)  # of others
     other = Unconfirmed(mapping, mapping, [5])
     other.backs.end(EARLY)  # the port of another line is lost
     assert (len(other.details), unconfirmed.details) == (1, [])
