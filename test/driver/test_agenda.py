@@ -329,16 +329,6 @@ def test_reads_of_a_busy_station_are_passed_over_and_stay_due() -> None:
     assert bench.next_read(0.0) is one
 
 
-def test_parts_replace_a_job() -> None:
-    whole, left, right = make_job(), make_job('N7:1'), make_job('N7:2')
-    bench = Bench(whole)
-    assert bench.next_read(0.0) is whole
-    bench.reads.replace([whole], [left, right], 0.0)
-    bench.finish(whole, 0.0, 0.0)
-    assert bench.reads.jobs == {left, right}
-    assert [bench.read(0.0), bench.read(0.0), bench.read(0.0)] == [left, right, None]
-
-
 def test_poll_cycle_is_that_of_the_slowest_job() -> None:
     one, other = make_job(), make_job('N9:0')
     bench = Bench(one, other)
