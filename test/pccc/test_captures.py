@@ -219,12 +219,6 @@ def test_what_they_have_accepted_of_ours_is_what_we_would_send(capture: Capture)
     assert compared
 
 
-@for_all('capture', CAPTURES)
-def test_every_command_has_words(capture: Capture) -> None:
-    for exchange in capture.exchanges():
-        assert 'unknown' not in describe(exchange.command), exchange.command
-
-
 # Logical ASCII and the memory area are read, and written as logical binary without it.
 @for_all('entry', commands(*(fnc for _, fnc in _READ if fnc > word_range.FILE_READ)))
 def test_command_of_every_vector_is_read_and_made_again(entry: Vector) -> None:

@@ -14,7 +14,6 @@
 
 """The data table of an emulated PLC, and places that have words in common."""
 
-from collections.abc import Callable
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.pccc.address import Address
@@ -77,39 +76,6 @@ def test_slots_are_files_of_their_own() -> None:
     with pytest.raises(NoSuchFile):
         words.read(at('I:3.0'), 1)
     assert [(area.file, area.slot) for area in words] == [(1, 1), (1, 2)]
-
-
-@for_all('act', [
-    lambda words, place: words.read(place, 1),
-    lambda words, place: words.write(place, b'\x01\x00'),
-    lambda words, place: words.write_bits(place, 1, 1)])
-@for_all(('text', 'error'), [('N7:3', OutOfRange), ('N9:0', NoSuchFile), ('B7:0', NoSuchFile)])
-def test_bad_place_changes_nothing(act: Callable[[DataTable, Address], object], text: str,
-                                   error: type[Exception]) -> None:
-    words = table(('N7:0', 3))
-    with pytest.raises(error):
-        act(words, at(text))
-    assert words.read(at('N7:0'), 3) == bytes(6)
-    assert len(list(words)) == 1
-
-
-def test_write_across_the_end_changes_nothing() -> None:
-    words = table(('N7:0', 3))
-    with pytest.raises(OutOfRange):
-        words.write(at('N7:2'), b'\x01\x00\x02\x00')
-    assert words.read(at('N7:0'), 3) == bytes(6)
-
-
-@for_all(('old', 'mask', 'bits', 'new'), [
-    (0x0008, 0x0108, 0x0100, 0x0100), (0xFFFF, 0x0001, 0x0000, 0xFFFE),
-    (0x0000, 0x0001, 0xFFFF, 0x0001), (0x1234, 0xFFFF, 0x4321, 0x4321),
-    (0x1234, 0x0000, 0xFFFF, 0x1234), (0x8000, 0x7FFF, 0x0000, 0x8000)])
-def test_write_bits_changes_the_bits_of_the_mask_only(old: int, mask: int, bits: int,
-                                                      new: int) -> None:
-    words = table(('B3:0', 3))
-    words.write(at('B3:1'), old.to_bytes(2, 'little'))
-    words.write_bits(at('B3:1'), mask, bits)
-    assert words.read(at('B3:0'), 3) == b'\x00\x00' + new.to_bytes(2, 'little') + b'\x00\x00'
 
 
 def test_file_number_has_one_type() -> None:

@@ -16,7 +16,6 @@
 
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.pccc.describe import command_codes, command_name, describe, Effect, effect_of
-from hypothesis import given, strategies
 from support.cases import for_all
 
 
@@ -73,7 +72,9 @@ def command(data: str, cmd: int = 0x0F) -> Packet:
     ('01 00 00 01 00 34 03 04 03 02', 'word range read E3.1.3.0.4.3, 1 word'),
     ('00 00 00 02 00 07 00 07 05 01 00 FF FF', 'word range write N7:5 = 0001 FFFF'),
     ('02 07 00 03 01 08 00 01 00', 'bit write B3:1 set 0008 reset 0001'),
-    ('04 00 00 04 00 0C 08 0A 08', 'file read B10:0, 4 words')])
+    ('04 00 00 04 00 0C 08 0A 08', 'file read B10:0, 4 words'),
+    ('68 00 00 01 00 0F 03 03 0A 00 01 00', 'typed read, memory area 3 is not the data table: '
+     '68 00 00 01 00 0F 03 03 0A 00 01 00')])
 def test_data_table_commands(data: str, text: str) -> None:
     assert describe(command(data)) == text
     assert describe(command(data, 0x2F)) == text  # with high priority
@@ -138,11 +139,6 @@ def test_no_other_command_counts_as_a_read_or_as_a_write_alone(
         == [*bytes.fromhex(functions)]
 
 
-def test_areas_of_a_plc5_beside_the_data_table_are_whole() -> None:
-    assert describe(command('68 00 00 01 00 0F 03 03 0A 00 01 00')) == (
-        'typed read, memory area 3 is not the data table: 68 00 00 01 00 0F 03 03 0A 00 01 00')
-
-
 @for_all('data', [
     'A2', 'A2 08 07', 'A2 08 07 89 1E 00 01', 'AA 04 07 89 00 00 01', '68 00 00 01 00 10',
     '67 00 00 01 00 07 00 07 00 42 01', '26', 'A9 02 07 89 1E 05 00 01'])
@@ -198,11 +194,3 @@ def test_name_of_a_command_has_cmd_and_fnc() -> None:
     assert command_name(command('A2 02').reply(b'\x01')) == '0F'
     assert command_name(command('00 02', 0x01)) == '01'
     assert command_name(command('')) == '0F'
-
-
-@given(strategies.integers(0, 255), strategies.binary(max_size=40), strategies.binary(max_size=40))
-def test_any_bytes_have_a_text(cmd: int, data: bytes, answer: bytes) -> None:
-    request = Packet(1, 5, cmd & ~0x40, 0, 1, data)
-    assert describe(request).isprintable()
-    assert describe(request.reply(answer), request).isprintable()
-    assert describe(request.reply(answer, 0xF0), request).isprintable()

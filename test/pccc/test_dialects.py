@@ -86,14 +86,6 @@ def test_write_read_and_write_bits_come_back(place: tuple[PlcType, Access, str],
     assert not any(table.read(address.at_offset(address.offset + 1), 4))
 
 
-@for_all('place', PLACES)
-def test_bits_outside_of_the_mask_do_not_count(place: tuple[PlcType, Access]) -> None:
-    address = parse_address(PLACES[place][0], place[0])
-    dialect = dialect_of(*place)
-    assert dialect.write_bits(address, 0x0108, 0xFF00) == dialect.write_bits(
-        address, 0x0108, 0x0100)
-
-
 @for_all('place', [place for place in WORDS if '.' not in place[2]])
 def test_largest_packets_are_served(place: tuple[PlcType, Access, str]) -> None:
     address, dialect, table = bench(*place, words=150)

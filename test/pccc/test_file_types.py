@@ -15,7 +15,6 @@
 """File types, their members, and what processors and families have of them."""
 
 from abdf1_ros.pccc import members
-from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.families import dialect_of, FAMILIES
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.members import Members
@@ -227,14 +226,3 @@ def test_every_file_fits_into_a_packet_of_the_processors_that_have_it() -> None:
         for kind in SLC_FILES:
             if any(processor.has_file(file, kind) for file in range(256)):
                 assert dialect.max_read(kind) > 0 and dialect.max_write(kind) > 0
-
-
-@for_all(('family', 'names'), [
-    ('PLC2', ['Unprotected', 'Protected', 'CIF']), ('PLC3', ['WordRange']),
-    ('PLC5', ['Typed', 'WordRange']), ('SLC', ['Slot', 'Flat'])])
-def test_ways_of_a_family_the_usual_one_first(family: str, names: list[str]) -> None:
-    assert [access.value for access in FAMILIES[PlcType(family)].accesses] == names
-
-
-def test_every_access_belongs_to_a_family() -> None:
-    assert {way for family in FAMILIES for way in FAMILIES[family].accesses} == set(Access)

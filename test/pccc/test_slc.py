@@ -20,7 +20,6 @@ from typing import TypeVar
 
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import FormatError, RemoteError
-from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.dialect import Steps
@@ -35,8 +34,6 @@ from abdf1_ros.pccc.slc.commands import (
     LogicalRead,
     LogicalWrite,
     MaskedWrite,
-    MAX_READ,
-    MAX_WRITE,
 )
 from abdf1_ros.pccc.slc.dialect import SlcDialect
 from abdf1_ros.pccc.slc.file_search import SlcFileSearch
@@ -85,10 +82,6 @@ def test_padding_behind_the_declared_size_is_passed_over(fnc: int, encoded: str)
     assert padded == READERS[fnc](Reader(bytes.fromhex(encoded)))
 
 
-def test_limits_of_the_manual() -> None:
-    assert (MAX_READ, MAX_WRITE) == (236, 234)
-
-
 def at(text: str) -> Address:
     return parse_address(text, SLC)
 
@@ -111,15 +104,6 @@ def test_packets_are_as_long_as_the_processor_takes_them(name: str, read: int, w
     assert 2 * dialect.max_write(FileType.INTEGER) == write
     assert dialect.max_read(FileType.TIMER) == read // 6 * 3
     assert dialect.max_write(FileType.PID) == write // 46 * 23
-
-
-def test_flat_io_of_the_whole_image() -> None:
-    address = parse_address('I:300', SLC, Access.FLAT)
-    assert DIALECT.read(address, 2) == (0x0F, bytes.fromhex('A2 04 01 83 FF 2C 01 00'))
-    assert DIALECT.write(address, b'\1\2') == (
-        0x0F, bytes.fromhex('AA 02 01 83 FF 2C 01 00 01 02'))
-    assert DIALECT.write_bits(address, 0x0008, 0x0008) == (
-        0x0F, bytes.fromhex('AB 02 01 83 FF 2C 01 00 08 00 08 00'))
 
 
 ALL_SLC = ('O:2.0', 2), ('I:1.0', 1), ('I:3.0', 4), ('S:0', 33), ('N7:0', 90), ('ST20:0', 84)
