@@ -121,15 +121,6 @@ def test_recording_that_begins_in_the_middle_is_half_duplex_after_all() -> None:
     assert poll == Poll(1, True)
 
 
-@given(strategies.lists(strategies.binary(max_size=30), max_size=20))
-def test_any_bytes_are_symbols_or_noise(chunks: list[bytes]) -> None:
-    whole, pieces = ListeningDecoder(LineKind()), ListeningDecoder(LineKind())
-    expected = symbols(whole, b''.join(chunks))
-    assert [symbol for chunk in chunks for symbol in symbols(pieces, chunk)] == expected
-    assert pieces.noise == whole.noise
-    assert pieces.finish() == whole.finish()
-
-
 @for_all('size', [1, 1000])
 @for_all(('wrong', 'right', 'damaged'), [
     (Checksum.CRC, Checksum.BCC, 2), (Checksum.BCC, Checksum.CRC, 0)])
