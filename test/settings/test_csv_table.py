@@ -19,8 +19,6 @@ from pathlib import Path
 
 from abdf1_ros.problems import ConfigurationError, Place
 from abdf1_ros.settings.csv_table import read_rows, read_table, Row
-from hypothesis import given
-from hypothesis import strategies as st
 import pytest
 from support.cases import for_all
 
@@ -120,23 +118,6 @@ def test_line_that_is_much_too_long_is_refused(path: Path) -> None:
     assert problems_of(path, f'Tag\na\nx{longest}\n"x{longest}\n') == [
         'FILE:3: this line has 131073 characters, at most 131072 are allowed',
         'FILE:4: this line has 131074 characters, at most 131072 are allowed']
-
-
-@given(content=st.one_of(
-    st.binary(max_size=200),
-    st.binary(max_size=100).map(lambda tail: b'Tag,Address,Length\n' + tail),
-    st.text('Tag,;\t\n\r"# ', max_size=60).map(str.encode)))
-def test_any_bytes_give_rows_or_a_configuration_error(
-        tmp_path_factory: pytest.TempPathFactory, content: bytes) -> None:
-    path = tmp_path_factory.getbasetemp() / 'any.csv'
-    try:
-        rows = rows_of(path, content)
-    except ConfigurationError as error:
-        assert error.problems and str(path) in str(error)
-    else:
-        assert [row.item for row in rows] == list(range(1, len(rows) + 1))
-        assert all(row.cells.keys() <= set(KNOWN) for row in rows)
-        assert all(before.line < after.line for before, after in zip(rows, rows[1:]))
 
 
 @for_all(('content', 'cells'), [

@@ -17,18 +17,9 @@
 from pathlib import Path
 
 from abdf1_ros.pccc.values import ValueType
-from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.map_file import load_mappings
-import pytest
 from support.cases import for_all
-from support.mappings import fault, faults, load_rows, load_text, row
-
-
-def test_needed_column_that_the_file_does_not_have() -> None:
-    with pytest.raises(ConfigurationError) as caught:
-        load_text('Tag,Command,Address,Station\na,Read,N7:0,1\nb,Read,N7:1,1\n')
-    problem, = caught.value.problems
-    assert str(problem).endswith('map.csv:1: column PLC_Type is missing, and each row needs it')
+from support.mappings import fault, faults, load_rows, row
 
 
 def test_bad_row_is_left_out_and_the_rest_stays() -> None:
@@ -40,11 +31,6 @@ def test_bad_row_is_left_out_and_the_rest_stays() -> None:
         '4:4', '7:11']
     assert 'Item: 2, ' in str(problems[0])
     assert 'Item: 4, ' in str(problems[1])
-
-
-def test_bad_file_as_a_whole() -> None:
-    with pytest.raises(ConfigurationError, match='did you mean Address'):
-        load_text('Tag,Adress\na,N7:0\n')
 
 
 def test_row_that_clashes_counts_for_nothing() -> None:

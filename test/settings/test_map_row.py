@@ -17,7 +17,6 @@
 from dataclasses import fields
 import math
 
-from abdf1_ros.messages import Severity
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.families import dialect_of
 from abdf1_ros.pccc.file_types import PlcType
@@ -56,13 +55,6 @@ def test_families_and_types_have_the_names_of_the_field(
         cells: dict[str, str], family: str, kind: str) -> None:
     mapping = one(Command='Read', Address='N7:0', **cells)
     assert (str(mapping.plc_type), mapping.type.value) == (family, kind)
-
-
-def test_cells_that_are_left_out_have_defaults() -> None:
-    mapping = one(Tag='x:y', Command='Read')
-    assert (mapping.length, mapping.type, mapping.topic, mapping.period, mapping.publish) == (
-        1, ValueType.INT16, 'x_y', None, Publish.ALWAYS)
-    assert (mapping.minimum, mapping.maximum) == (-math.inf, math.inf)
 
 
 @for_all(('text', 'reads', 'writes'), [
@@ -192,22 +184,25 @@ def test_cells_that_just_fit() -> None:
     assert one(Address='N7:998', Type='int32')
 
 
-@for_all(('column', 'texts'), [
-    ('Command', ['Command = "{}" should be one of Read']),
-    ('Station', ['Item: 1, Station = "{}" should']),
-    ('PLC_Type', ['PLC Type ({}) should be one of PLC2']),
-    ('Address', ['Invalid Address Syntax ({}); write type'])])
-def test_long_cell_is_shown_without_its_end(column: str, texts: list[str]) -> None:
-    shown = fault(**{column: 'x' * 5000})
-    assert all(text.format('x' * 100 + '...') in shown for text in texts)
-    assert len(shown) < 500
+LONG = 'x' * 5000
 
 
-@pytest.mark.parametrize('cells', [
-    {'Length': "'" + '9' * 5000}, {'Min': f'"{"1" * 5000},000"'},
-    {'Address': f'T4:0.{"x" * 5000}'}])
-def test_advice_on_a_long_cell_is_without_its_end(cells: dict[str, str]) -> None:
-    assert len(fault(**cells)) < 600
+@for_all(('cells', 'text'), [
+    ({'Command': LONG}, 'Command = "{}" should be one of Read'),
+    ({'Station': LONG}, 'Item: 1, Station = "{}" should'),
+    ({'PLC_Type': LONG}, 'PLC Type ({}) should be one of PLC2'),
+    ({'Address': LONG}, 'Invalid Address Syntax ({}); write type'),
+    ({'Command': 'Write', 'Fallback': LONG, 'Fallback_After': '500'}, '"{}"'),
+    ({'Command': 'Write', 'Fallback': '0', 'Fallback_After': LONG}, '"{}"'),
+    ({'Command': 'Read', 'While': LONG}, '"{}"'),
+    ({'Command': 'Heartbeat', 'While': 'a', 'While_Timeout': '9' * 5000}, f'"{100 * "9"}..."'),
+    # In advice, too.
+    ({'Length': "'" + '9' * 5000}, ''), ({'Min': f'"{"1" * 5000},000"'}, ''),
+    ({'Address': f'T4:0.{LONG}'}, '')])
+def test_long_cell_is_shown_without_its_end(cells: dict[str, str], text: str) -> None:
+    told = faults(row(**cells))
+    assert text.format('x' * 100 + '...') in told[0]
+    assert all(len(shown) < 600 for shown in told)
 
 
 def test_remark_on_a_long_cell_is_without_its_end() -> None:
@@ -222,14 +217,6 @@ def test_both_ends_of_a_range(column: str, texts: tuple[str, ...]) -> None:
     for text in texts:
         mappings, problems = load_rows(row(**{column: f'"{text}"'}))
         assert (len(mappings), problems) == (1, [])
-
-
-def test_numbered_faults_are_errors() -> None:
-    _, problems = load_rows(row(Station='999', Address='??'), row(PLC_Type='S7'))
-    assert sorted(problem.message.number for problem in problems if problem.message) == [
-        2501, 2502, 2503]
-    assert all(problem.message and problem.message.severity is Severity.ERROR
-               for problem in problems)
 
 
 @for_all('plc', ['PLC5', 'SLC'])
@@ -265,6 +252,8 @@ def test_scale_or_offset_make_the_message_float32(
         cells: dict[str, str], scaling: Scaling | None) -> None:
     mapping = one(**cells)
     assert mapping.scaling == scaling
+    assert (cell_of(mapping, 'Scale'), cell_of(mapping, 'Offset')) == (
+        (f'{scaling.scale:g}', f'{scaling.offset:g}') if scaling else ('', ''))
     assert mapping.type is ValueType.INT16
     assert mapping.message_type is (ValueType.FLOAT32 if scaling else ValueType.INT16)
 

@@ -27,18 +27,9 @@ from abdf1_ros.settings.columns import BY_NAME, COLUMNS, MAP_COLUMNS
 from abdf1_ros.settings.mapping import Command, Mapping, Publish
 from abdf1_ros.settings.names import MAX_LENGTH, sanitise
 from abdf1_ros.settings.rows import Rows
-from hypothesis import given
-from hypothesis import strategies as st
 import pytest
-from support.cases import ANY_CHARACTER, for_all
+from support.cases import for_all
 from support.mappings import cell_of, make_mapping, one
-
-
-@pytest.mark.parametrize('cells, scale, offset', [
-    ({'Scale': '0.1'}, '0.1', '0'), ({'Offset': '-40.5'}, '1', '-40.5'), ({}, '', '')])
-def test_scale_and_offset_as_text(cells: dict[str, str], scale: str, offset: str) -> None:
-    mapping = one(**cells)
-    assert (cell_of(mapping, 'Scale'), cell_of(mapping, 'Offset')) == (scale, offset)
 
 
 def test_codec_of_a_bit_mapping_begins_at_its_bit() -> None:
@@ -132,10 +123,6 @@ def test_the_usual_processor_is_the_default() -> None:
     assert BY_NAME['Processor'].default == USUAL.value
 
 
-# What rcl accepts as a relative name (ROS.md 4.4).
-_LEGAL = re.compile(r'[A-Za-z][A-Za-z0-9_]*(/[A-Za-z][A-Za-z0-9_]*)*')
-
-
 @for_all(('text', 'name'), [
     ('line_speed', 'line_speed'), ('N7:0', 'N7_0'), ('B3/12', 'B3/t12'), ('7seg', 't7seg'),
     ('a-b', 'a_b'), ('a b', 'a_b'), ('Tank.Level', 'Tank_Level'), ('Füllstand', 'F_llstand'),
@@ -149,14 +136,6 @@ def test_name_of_a_text(text: str, name: str) -> None:
 @for_all('text', ['', '_', '__', '/', '///', ':', 'ü', '日本', ' - / - '])
 def test_nothing_is_left_of_text_without_letter_or_digit(text: str) -> None:
     assert sanitise(text) == ''
-
-
-@given(st.text(ANY_CHARACTER))
-def test_any_text_becomes_a_legal_name_or_nothing(text: str) -> None:
-    name = sanitise(text)
-    assert name == '' or _LEGAL.fullmatch(name)
-    assert '__' not in name and not name.endswith('_')
-    assert sanitise(name) == name
 
 
 def test_longest_name_fits_with_namespace_and_node_into_what_dds_takes() -> None:

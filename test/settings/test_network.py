@@ -27,10 +27,8 @@ from abdf1_ros.settings.network import FIELDS, load_network, make_network, MODE_
 from abdf1_ros.settings.remarks import network_remarks
 from abdf1_ros.settings.share import share_places, SharePlace
 from abdf1_ros.settings.station_lists import parse_stations
-from hypothesis import given
-from hypothesis import strategies as st
 import pytest
-from support.cases import ANY_CHARACTER, for_all
+from support.cases import for_all
 
 # Column, field, default, good values, bad values (S0, network table).
 NUMBERS = [
@@ -170,15 +168,6 @@ def test_mode_in_the_words_of_other_programs_is_translated(
     assert problem.endswith(f'Peer, Radio, or Listen; "{mode}" is {meant}')
 
 
-def test_all_faults_are_reported_at_once_each_in_its_place(path: Path) -> None:
-    header = 'Baud,Station,Com_Port,Parity,Timeout'
-    path.write_text(f'# a comment\n\n{header}\n\n1,999,x,y,-5\n', encoding='utf-8')
-    with pytest.raises(ConfigurationError) as caught:
-        load_network(str(path))
-    assert sorted(str(problem.place) for problem in caught.value.problems) == [
-        f'{path}:5:{cell} ({column})' for cell, column in enumerate(header.split(','), 1)]
-
-
 @for_all(('text', 'port'), [
     ('1', '/dev/ttyS0'), ('8', '/dev/ttyS7'), ('32', '/dev/ttyS31'),
     ('/dev/ttyUSB0', '/dev/ttyUSB0'),
@@ -239,17 +228,6 @@ def test_fault_of_an_override_names_the_parameter() -> None:
         '115200',
         'net.station: 2552 CRT_BAD_STATION_ID: Station = "-1" should be a whole number from 0 to '
         '254']
-
-
-@given(st.sampled_from(sorted(FIELDS)), st.text(ANY_CHARACTER, max_size=8))
-def test_any_text_gives_a_network_or_a_configuration_error(name: str, text: str) -> None:
-    try:
-        network = make_network({name: (text, 'here')})
-    except ConfigurationError as error:
-        assert str(error).startswith('here: ')
-    else:
-        assert network.port.startswith('/') or '://' in network.port
-        assert network.timing.char_time > 0
 
 
 def test_radio_modem_and_what_it_sends_on(path: Path) -> None:

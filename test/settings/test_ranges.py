@@ -19,8 +19,6 @@ import re
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
-from hypothesis import given
-from hypothesis import strategies as st
 import pytest
 from support.cases import for_all
 from support.mappings import fault, one
@@ -117,13 +115,3 @@ def test_length_beside_a_range_agrees_with_it() -> None:
 def test_range_where_one_address_is_meant_is_told_with_its_length() -> None:
     with pytest.raises(FormatError, match='^write T4:0, and Length 12$'):
         parse_address('T4:0-3', PlcType.SLC)
-
-
-@given(st.sampled_from([SLC, PLC5, PLC2, PLC3]), st.text(
-    st.sampled_from('BINOST0123479:/.-,L{}[] '), max_size=12))
-def test_no_text_breaks_the_reader(family: str, text: str) -> None:
-    try:
-        parse_address(text, PlcType(family))
-    except FormatError as error:
-        if match := re.search('write (.*), and Length', str(error)):
-            assert parse_address(match[1], PlcType(family))
