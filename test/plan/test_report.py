@@ -63,13 +63,6 @@ def test_write_over_what_another_row_reads_is_odd() -> None:
         assert report_of(bits, make_mapping(address, command, station=station)).remarks() == []
 
 
-def test_words_that_two_rows_write_are_odd() -> None:
-    first = make_mapping('N7:0', 'Write', tag='jog', length=2)
-    assert report_of(first, make_mapping('N7:1', 'Write', tag='rip', item=4)).remarks() == [
-        Remark(RemarkKind.SETTING, 'map.csv:5: rip writes N7:1, of which jog also writes some or '
-                                   'all: each row overwrites values of the other row', 1)]
-
-
 def texts(report: Report, kind: RemarkKind) -> list[str]:
     return [remark.text for remark in report.remarks() if remark.kind is kind]
 

@@ -20,7 +20,6 @@ import stat
 
 from abdf1_ros.problems import Problem
 from abdf1_ros.sniffer import capture
-from hypothesis import given, strategies
 import pytest
 from support.cases import for_all
 
@@ -53,16 +52,6 @@ def test_capture_is_text_that_is_there_before_it_is_closed(tmp_path: Path) -> No
     settings: dict[str, str] = {}
     assert list(capture.read_capture('x', TEXT.splitlines(), settings)) == CHUNKS
     assert settings == {'baud': '19200'}
-
-
-@given(strategies.builds(
-    capture.Chunk, strategies.integers(0, 10**12).map(lambda micros: micros / 1e6),
-    strategies.sampled_from(capture.Direction), strategies.binary(min_size=1, max_size=50),
-    strategies.just(False), strategies.just('')))
-def test_chunk_that_was_written_reads_back_the_same(chunk: capture.Chunk) -> None:
-    (again,) = capture.read_capture('x', ['# abdf1_ros capture 1', str(chunk)], {})
-    assert again.time == pytest.approx(chunk.time, abs=1e-6)
-    assert again[1:] == chunk[1:]
 
 
 def test_guest_is_told_with_the_next_chunk() -> None:

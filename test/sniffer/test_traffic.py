@@ -25,7 +25,6 @@ from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.sniffer.capture import Chunk, Direction
 from abdf1_ros.sniffer.entries import Entry, Kind, Mark
 from abdf1_ros.sniffer.traffic import TrafficDecoder
-from hypothesis import given, strategies
 import pytest
 from support.captures import Capture, CAPTURES, FOLDER
 from support.cases import for_all
@@ -277,33 +276,6 @@ def test_conversation_of_a_master_and_two_slaves(noise: Noise) -> None:
         assert {Kind.DAMAGED, Kind.NOISE, Kind.SILENCE} <= set(kinds(entries))
         assert any(Mark.DUPLICATE in entry.marks or Mark.RETRANSMISSION in entry.marks
                    for entry in entries)
-
-
-PIECES = strategies.tuples(
-    strategies.floats(0, 1e6), strategies.sampled_from(Direction), strategies.one_of(
-        strategies.binary(max_size=20),
-        strategies.sampled_from([data for _, data in TRANSACTION])))
-
-
-@given(strategies.lists(PIECES, max_size=30),
-       strategies.sampled_from([None, *Checksum]), strategies.sampled_from([None, *Duplex]))
-def test_any_bytes_in_any_chunks(said: list[tuple[float, Direction, bytes]],
-                                 checksum: Checksum | None, duplex: Duplex | None) -> None:
-    session = TrafficDecoder(checksum, duplex)
-    for chunk in said:
-        for entry in session.feed(Chunk(*chunk)):
-            assert entry.text.isprintable()
-    assert all(entry.text.isprintable() for entry in session.finish())
-
-
-@given(strategies.data())
-def test_chunks_do_not_matter(data: strategies.DataObject) -> None:
-    whole = b''.join(part for _, part in TRANSACTION)
-    cuts = sorted(data.draw(strategies.sets(strategies.integers(0, len(whole)))))
-    parts = [whole[begin:end] for begin, end in zip([0, *cuts], [*cuts, len(whole)])]
-    expected = [(entry.kind, entry.text) for entry in decode(TRANSACTION)]
-    assert [(entry.kind, entry.text)
-            for entry in decode([(UNKNOWN, part) for part in parts])] == expected
 
 
 @for_all('checksum', Checksum)
