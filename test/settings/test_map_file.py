@@ -12,14 +12,24 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The map CSV as a whole: rows that clash, and rows that are left out."""
+"""The map CSV: rows that clash or are left out, columns, defaults, and texts of its errors."""
 
+from dataclasses import fields
+import math
 from pathlib import Path
 
-from abdf1_ros.pccc.values import ValueType
+from abdf1_ros.pccc.access import Access
+from abdf1_ros.pccc.families import dialect_of
+from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.processor import Processor
+from abdf1_ros.pccc.values import ValueType, WordOrder
+from abdf1_ros.settings.columns import COLUMNS
 from abdf1_ros.settings.map_file import load_mappings
+from abdf1_ros.settings.mapping import Command, Publish
+from abdf1_ros.settings.scaling import Scaling
+import pytest
 from support.cases import for_all
-from support.mappings import fault, faults, load_rows, row
+from support.mappings import cell_of, fault, faults, load_rows, one, row
 
 
 def test_bad_row_is_left_out_and_the_rest_stays() -> None:
@@ -128,3 +138,309 @@ def test_rows_that_do_not_clash(rows: list[dict[str, str]]) -> None:
         row(**{'Tag': f'tag{number}'} | cells) for number, cells in enumerate(rows)))
     assert (len(mappings), problems) == (len(rows), [])
     assert len(faults(row(Topic='t'), row(Topic='t'))) == 2  # one tag and one topic
+
+
+# One row
+
+
+def test_row_with_every_column() -> None:
+    mapping = one(Tag='Line speed', Command='readwrite', Address='n7:10', Station='254',
+                  PLC_Type='slc', Length='4', Type='FLOAT32', Topic='cell/1 speed', Period='250',
+                  Publish='change', Min='-1.5', Max='99', Description='"Roller, hall 3"')
+    expected = {
+        'item': 1, 'tag': 'Line speed', 'name': 'Line_speed', 'command': Command.READ_WRITE,
+        'station': 254, 'plc_type': PlcType.SLC, 'length': 4, 'type': ValueType.FLOAT32,
+        'topic': 'cell/t1_speed', 'period': 250, 'publish': Publish.CHANGE, 'minimum': -1.5,
+        'maximum': 99.0, 'access': Access.SLOT, 'description': 'Roller, hall 3'}
+    others = {'place', 'address', 'remarks'}
+    assert {field.name: getattr(mapping, field.name) for field in fields(mapping)
+            if field.init and field.name not in others} == {
+        field.name: expected.get(field.name, field.default) for field in fields(mapping)
+        if field.init and field.name not in others}
+    assert str(mapping.address) == 'N7:10'
+
+
+@pytest.mark.parametrize(('cells', 'family', 'kind'), [
+    ({'PLC_Type': 'PLC-5', 'Type': 'DINT'}, 'PLC5', 'int32'),
+    ({'PLC_Type': 'SLC 5/03', 'Type': 'REAL'}, 'SLC', 'float32'),
+    ({'PLC_Type': 'MicroLogix', 'Type': 'Word'}, 'SLC', 'uint16')])
+def test_families_and_types_have_the_names_of_the_field(
+        cells: dict[str, str], family: str, kind: str) -> None:
+    mapping = one(Command='Read', Address='N7:0', **cells)
+    assert (str(mapping.plc_type), mapping.type.value) == (family, kind)
+
+
+@for_all(('text', 'reads', 'writes'), [
+    ('Read', True, False), ('Write', False, True), ('ReadWrite', True, True),
+    ('READ', True, False), ('write', False, True), ('R/W', True, True), ('rw', True, True)])
+def test_command_says_whether_a_row_reads_and_writes(text: str, reads: bool, writes: bool) -> None:
+    mapping = one(Command=text)
+    assert (mapping.reads, mapping.writes) == (reads, writes)
+
+
+@for_all(('cells', 'expected'), [
+    ({'Station': '255'},
+     '4 (Station): 2501 ERR_BAD_STATION: Item: 1, Invalid station number (255) must be less than '
+     '255'),
+    ({'Station': 'PLC'}, '4 (Station): 2501 ERR_BAD_STATION: Item: 1, Station = "PLC" should be a '
+     'whole number from 0 to 254'),
+    ({'PLC_Type': 'S7'},
+     '5 (PLC_Type): 2502 ERR_BAD_PLC_TYPE: Item: 1, Invalid or Unsupported PLC Type (S7) should '
+     'be one of PLC2, PLC3, PLC5, SLC; a MicroLogix is SLC'),
+    ({'Address': 'N7'}, '3 (Address): 2503 ERR_ADDRESS_SYNTAX: Item: 1, Invalid Address Syntax '
+     '(N7); an element is missing, as in N7:0'),
+    ({'Address': 'N7:2000'}, '3 (Address): 2504 ERR_ADDRESS_RANGE: Item: 1, Address is out of '
+     'range (N7:2000, len=1); elements of N run from 0 to 1999'),
+    ({'Address': '018', 'PLC_Type': 'PLC2'}, '3 (Address): 2503 ERR_ADDRESS_SYNTAX: Item: 1, '
+     'Invalid Address Syntax (018); PLC-2 words and bits are octal, as in 020 or 110/17'),
+    ({'Command': 'Poll'}, '2 (Command): Item: 1, Command = "Poll" should be one of '
+     + ', '.join(command.value for command in Command)),
+    ({'Publish': 'Never'}, '10 (Publish): Item: 1, Publish = "Never" should be one of Always, '
+     'Change'),
+    ({'Type': 'int8'}, '7 (Type): Item: 1, Type = "int8" should be one of bool, int16, uint16, '
+     'int32, uint32, float32, bcd16, bcd12, string'),
+    ({'Length': '0'}, '6 (Length): Item: 1, Length = "0" should be a whole number from 1 to '
+     '65535'),
+    ({'Period': '86400001'}, '9 (Period): Item: 1, Period = "86400001" should be a whole number '
+     'from 0 to 86400000 ms, or "on demand"'),
+    ({'Min': 'low'}, '11 (Min): Item: 1, Min = "low" should be a number'),
+    ({'Min': '1_000'}, '11 (Min): Item: 1, Min = "1_000" should be a number'),
+    ({'Min': '\u0661'}, '11 (Min): Item: 1, Min = "\u0661" should be a number; '
+     'character 1 is U+0661 ARABIC-INDIC DIGIT ONE'),
+    ({'Max': 'inf'}, '12 (Max): Item: 1, Max = "inf" should be a number'),
+    ({'Max': '1e999'}, '12 (Max): Item: 1, Max = "1e999" should be a number'),
+    ({'Tag': '--'}, '1 (Tag): Item: 1, Tag = "--" has no letter, digit or underscore'),
+    ({'Topic': '/'}, '8 (Topic): Item: 1, Topic = "/" has no letter, digit or underscore'),
+    ({'Topic': 'x' * 151}, '8 (Topic): Item: 1, Topic has 151 characters, at most 150 are '
+     'allowed'),
+    *(({column: ''}, f'{COLUMNS.index(column) + 1} ({column}): Item: 1, {column} is missing')
+      for column in ('Tag', 'Command', 'Address', 'Station', 'PLC_Type')),
+    # Cells that do not fit each other.
+    ({'Address': 'F8:0', 'Type': 'int16'}, '7 (Type): Item: 1, F8:0 can be float32'),
+    ({'Address': 'B3:0', 'Type': 'string'},
+     '7 (Type): Item: 1, B3:0 can be uint16, int16, bcd16, bcd12, int32, uint32, float32'),
+    ({'Type': 'bool'}, '7 (Type): Item: 1, N7:0 can be int16, uint16, bcd16, bcd12, int32, '
+     'uint32, float32, string; a bool needs a bit address such as B3:0/5'),
+    ({'Address': 'B3:0/5', 'Type': 'int16'},
+     '7 (Type): Item: 1, B3:0/5 can be bool: it is a bit; its word is B3:0'),
+    ({'Address': 'T4:0.DN', 'Type': 'int16'}, '7 (Type): Item: 1, T4:0/DN can be bool: it is a '
+     'bit; the values of this element are T4:0.PRE, T4:0.ACC'),
+    ({'Address': 'ST9:0', 'Max': '4'},
+     '12 (Max): Item: 1, a string has no Max; leave the cell empty'),
+    ({'Address': 'ST9:0', 'Length': '2'}, '6 (Length): Item: 1, a string mapping has Length 1'),
+    *(({'Min': '5', 'Max': '4'} | scale, '11 (Min): Item: 1, Min is greater than Max')
+      for scale in ({}, {'Scale': '0.1'})),
+    ({'Address': 'T4:0/13', 'Length': '4', 'Command': 'Read'},
+     '6 (Length): 2504 ERR_ADDRESS_RANGE: Item: 1, Address is out of range (T4:0/13, len=4); bits '
+     'of a structure end with their word'),
+    ({'Address': 'PD9:0.SP', 'Length': '25', 'Command': 'Read'},
+     '6 (Length): Item: 1, 25 float32 from PD9:0.SP reach to PD9:0.50, where words of 16 bits '
+     'are'),
+    ({'Address': 'MG9:0/EN', 'Command': 'Write'}, '3 (Address): Item: 1, MG9:0/EN belongs to the '
+     'processor; of such an element can be written: TO, CO'),
+    ({'Address': 'F8:0', 'Word_Order': 'High'}, '13 (Word_Order): Item: 1, Word_Order High is for '
+     'int32, uint32 and float32 over words of 16 bits such as N7:0, not for float32 at F8:0'),
+    ({'Word_Order': 'High'}, '13 (Word_Order): Item: 1, Word_Order High is for int32, uint32 and '
+     'float32 over words of 16 bits such as N7:0, not for int16 at N7:0'),
+    ({'Scale': '-0.0', 'Offset': '2'}, '14 (Scale): Item: 1, Scale should not be 0'),
+    ({'Scale': 'x'}, '14 (Scale): Item: 1, Scale = "x" should be a number'),
+    ({'Offset': '"1,000"'},
+     '15 (Offset): Item: 1, Offset = "1,000" could be two numbers; write 1000 or 1.000'),
+    ({'Address': 'B3:0/4', 'Scale': '2'},
+     '14 (Scale): Item: 1, Scale and Offset are for numbers, not for bool'),
+    ({'Offset': '1e9'},
+     '15 (Offset): Item: 1, a float32 has too few digits to tell the values apart in 999967232 '
+     'to 1000032767, the range of int16 with Scale 1, Offset 1000000000'),
+    ({'Access': 'CIF'},
+     '16 (Access): Item: 1, Access = "CIF" of a PLC5 should be one of Typed, WordRange'),
+    ({'Access': 'Typed', 'Command': 'Serve'}, '16 (Access): Item: 1, Access = "Typed" of a Serve '
+     'row should be Read, for words that the other end cannot write, or empty'),
+    *(({'PLC_Type': 'PLC2', 'Access': 'CIF'} | place, '3 (Address): Item: 1, Access CIF has no '
+       'command that changes single bits; write the whole word, or only read')
+      for place in ({'Address': '020/05'}, {'Address': '020', 'Type': 'bcd12'})),
+    ({'PLC_Type': 'SLC', 'Processor': '5/06'}, '17 (Processor): Item: 1, Processor = "5/06" '
+     'should be one of 5/01, 5/02, 5/03, 5/04, 5/05, ML1000, ML1100, ML1200, ML1400, ML1500'),
+    ({'Processor': '5/03'}, '17 (Processor): Item: 1, Processor is for PLCs of type SLC that we '
+     'read or write; leave the cell empty'),
+    ({'PLC_Type': 'SLC', 'Processor': '5/03', 'Command': 'Serve'}, '17 (Processor): Item: 1, a '
+     'Serve row has no Processor: it is for Read, Write, ReadWrite and Heartbeat rows; leave the '
+     'cell empty'),
+    ({'PLC_Type': 'SLC', 'Processor': '5/05', 'Address': 'L10:0'}, '3 (Address): Item: 1, 5/05 '
+     'has no file L10; ML1100, ML1200, ML1400, ML1500 may have it'),
+    ({'PLC_Type': 'SLC', 'Processor': 'ML1000', 'Address': 'N10:0'}, '3 (Address): Item: 1, '
+     'ML1000 has no file N10; 5/01, 5/02, 5/03, 5/04, 5/05, ML1100, ML1200, ML1400, ML1500 may '
+     'have it')])
+def test_fault_is_told_word_for_word(cells: dict[str, str], expected: str) -> None:
+    assert fault(**cells) == f'2:{expected}'
+
+
+@for_all(('cells', 'length', 'last'), [
+    ({'Address': 'N7:1990'}, 10, 'N7:1999'), ({'Address': 'F8:1999'}, 1, 'F8:1999'),
+    ({'Address': 'N7:250', 'PLC_Type': 'SLC'}, 6, 'N7:255'),
+    ({'Address': 'T4:1999', 'Command': 'Read'}, 3, 'T4:1999.ACC'),
+    ({'Address': 'B3:1998/1'}, 31, 'B3:1999'), ({'Address': 'S:127'}, 1, 'S2:127'),
+    ({'Address': 'I:277', 'Command': 'Read'}, 1, 'I:277'),
+    ({'Address': 'I:30.255', 'PLC_Type': 'SLC'}, 1, 'I:30.255'),
+    ({'Address': '077777', 'PLC_Type': 'PLC2'}, 1, '077777')])
+def test_mapping_ends_with_its_file(cells: dict[str, str], length: int, last: str) -> None:
+    assert one(**cells, Length=str(length))
+    assert fault(**cells, Length=str(length + 1)) == (
+        '2:6 (Length): 2504 ERR_ADDRESS_RANGE: Item: 1, Address is out of range '
+        f'({cells["Address"]}, len={length + 1}); the last word there can be is {last}')
+
+
+def test_cells_that_just_fit() -> None:
+    assert one(Min='5', Max='5').maximum == 5
+    assert one(Address='T4:0/13', Length='3', Command='Read')
+    assert one(Address='F8:0', Word_Order='Low').word_order is WordOrder.LOW
+    assert one(PLC_Type='PLC2', Address='020/05', Access='CIF', Command='Read')
+    assert one(Address='N7:998', Type='int32')
+
+
+LONG = 'x' * 5000
+
+
+@for_all(('cells', 'text'), [
+    ({'Command': LONG}, 'Command = "{}" should be one of Read'),
+    ({'Station': LONG}, 'Item: 1, Station = "{}" should'),
+    ({'PLC_Type': LONG}, 'PLC Type ({}) should be one of PLC2'),
+    ({'Address': LONG}, 'Invalid Address Syntax ({}); write type'),
+    ({'Command': 'Write', 'Fallback': LONG, 'Fallback_After': '500'}, '"{}"'),
+    ({'Command': 'Write', 'Fallback': '0', 'Fallback_After': LONG}, '"{}"'),
+    ({'Command': 'Read', 'While': LONG}, '"{}"'),
+    ({'Command': 'Heartbeat', 'While': 'a', 'While_Timeout': '9' * 5000}, f'"{100 * "9"}..."'),
+    # In advice, too.
+    ({'Length': "'" + '9' * 5000}, ''), ({'Min': f'"{"1" * 5000},000"'}, ''),
+    ({'Address': f'T4:0.{LONG}'}, '')])
+def test_long_cell_is_shown_without_its_end(cells: dict[str, str], text: str) -> None:
+    told = faults(row(**cells))
+    assert text.format('x' * 100 + '...') in told[0]
+    assert all(len(shown) < 600 for shown in told)
+
+
+def test_remark_on_a_long_cell_is_without_its_end() -> None:
+    remark, = one(Topic='a' + ' ' * 5000 + 'b').remarks
+    assert len(str(remark)) < 500
+
+
+@for_all(('column', 'texts'), [
+    ('Station', ('0', '254')), ('Length', ('1', '1000')), ('Period', ('0', '86400000')),
+    ('Min', ('0', '-3.5', '1e3', '-2,5')), ('Max', ('0', '1e300')), ('Topic', ('x' * 150,))])
+def test_both_ends_of_a_range(column: str, texts: tuple[str, ...]) -> None:
+    for text in texts:
+        mappings, problems = load_rows(row(**{column: f'"{text}"'}))
+        assert (len(mappings), problems) == (1, [])
+
+
+@for_all('plc', ['PLC5', 'SLC'])
+@for_all('address', ['A10:2', 'N7:2'])
+def test_string_over_words_counts_words(address: str, plc: str) -> None:
+    mapping = one(Address=address, PLC_Type=plc, Type='string', Length='20')
+    assert (mapping.codec.words, mapping.codec.packed) == (20, True)
+    assert mapping.codec.decode(mapping.codec.encode('odd')) == 'odd'
+    assert not one(Address='ST9:0').codec.packed
+
+
+@for_all('cells', [
+    {'Address': 'N7:0', 'Type': 'int32'}, {'Address': 'N7:0', 'Type': 'uint32'},
+    {'Address': 'B3:0', 'Type': 'float32'}, {'Address': 'D9:0', 'Type': 'float32'},
+    {'Address': 'S:0', 'Type': 'int32'}, {'Address': 'A9:0', 'Type': 'int32'},
+    {'Address': 'O:001', 'Type': 'uint32', 'Command': 'Serve'}])
+def test_word_order_is_high_where_the_cell_says_so_and_low_without_it(
+        cells: dict[str, str]) -> None:
+    mapping = one(Word_Order='high', **cells)
+    assert mapping.word_order is mapping.codec.word_order is WordOrder.HIGH
+    assert cell_of(mapping, 'Word_Order') == 'High'
+    low = one(**cells)
+    assert low.word_order is low.codec.word_order is WordOrder.LOW
+    assert mapping != low
+
+
+@for_all(('cells', 'scaling'), [
+    ({'Scale': '0.1'}, Scaling(0.1, 0.0)), ({'Offset': '-40'}, Scaling(1.0, -40.0)),
+    ({'Scale': '-2', 'Offset': '1e3'}, Scaling(-2.0, 1000.0)),
+    ({'Scale': '"0,25"', 'Offset': '0'}, Scaling(0.25, 0.0)),
+    ({'Scale': '1'}, Scaling(1.0, 0.0)), ({}, None)])
+def test_scale_or_offset_make_the_message_float32(
+        cells: dict[str, str], scaling: Scaling | None) -> None:
+    mapping = one(**cells)
+    assert mapping.scaling == scaling
+    assert (cell_of(mapping, 'Scale'), cell_of(mapping, 'Offset')) == (
+        (f'{scaling.scale:g}', f'{scaling.offset:g}') if scaling else ('', ''))
+    assert mapping.type is ValueType.INT16
+    assert mapping.message_type is (ValueType.FLOAT32 if scaling else ValueType.INT16)
+
+
+# Families and access
+
+
+@for_all(('plc', 'text', 'access'), [
+    ('PLC2', '', 'Unprotected'), ('PLC2', 'protected', 'Protected'), ('PLC2', 'cif', 'CIF'),
+    ('PLC3', '', 'WordRange'), ('PLC5', '', 'Typed'), ('PLC5', 'WORDRANGE', 'WordRange'),
+    ('SLC', '', 'Slot'), ('SLC', 'flat', 'Flat')])
+def test_access_chooses_the_dialect(plc: str, text: str, access: str) -> None:
+    mapping = one(PLC_Type=plc, Address='020' if plc == 'PLC2' else 'N7:0', Access=text)
+    assert (mapping.access, cell_of(mapping, 'Access')) == (Access(access), access)
+    assert mapping.dialect is dialect_of(PlcType(plc), Access(access))
+
+
+# Structures, flat I/O and processors
+
+
+def test_io_by_the_word_of_the_image() -> None:
+    mapping = one(PLC_Type='SLC', Address='i:5/3', Access='Flat', Command='Read')
+    assert (cell_of(mapping, 'Address'), mapping.address.is_flat) == ('I:5/3', True)
+    text = fault(PLC_Type='SLC', Address='I:1.0', Access='Flat', Command='Read')
+    assert text.endswith('with access Flat write the word of the whole image, as in I:5 or O:0/3')
+
+
+@for_all('processor', Processor)
+def test_processor_chooses_the_dialect(processor: Processor) -> None:
+    mapping = one(PLC_Type='SLC', Processor=processor.value.lower())
+    assert (mapping.processor, cell_of(mapping, 'Processor')) == (processor, processor.value)
+    assert mapping.dialect is dialect_of(PlcType.SLC, None, processor)
+
+
+def test_slc_without_a_processor_is_taken_for_a_5_03() -> None:
+    mapping = one(PLC_Type='SLC', Address='L10:0', Command='Read')  # or for a MicroLogix
+    assert (mapping.processor, cell_of(mapping, 'Processor')) == (None, '')
+    assert mapping.dialect is dialect_of(PlcType.SLC, None, Processor.SLC_5_03)
+
+
+@for_all('place', ['T4:1', 'C5:1', 'R6:1', 'MG9:0/EN'])
+def test_structures_that_we_serve_are_ours_to_write(place: str) -> None:
+    assert str(one(Command='Serve', Address=place, Station='5').address).startswith(place[:4])
+    assert 'belongs to the processor' in fault(Command='ReadWrite', Address=place)
+
+
+def test_row_on_demand_has_no_period_and_promises_nothing() -> None:
+    row = one(Period=' On  Demand', Command='Read')
+    assert (row.is_on_demand, row.period, row.promise(3.0)) == (True, None, math.inf)
+    assert cell_of(row, 'Period') == 'on demand'
+
+
+def test_row_on_demand_is_no_counter() -> None:
+    counter = row(Tag='counter', Command='Read', Period='on demand')
+    guarded = row(Tag='guarded', Command='Read', Address='N7:1', While='counter',
+                  While_Timeout='5000')
+    told = faults(counter, guarded)
+    assert [text for text in told if '"counter" is read only on demand' in text]
+
+
+@for_all(('cells', 'expected'), [
+    ({'Command': 'Read'}, 'a Read row has no Write_Again: it is for Write and ReadWrite rows'),
+    ({'Command': 'Heartbeat'}, 'a Heartbeat row has no Write_Again'),
+    ({'Command': 'Write', 'Station': '255'}, 'no station confirms what is written to 255'),
+    ({'Command': 'Write', 'Write_Again': '1'}, 'should be ms from 100 to 3600000'),
+    ({'Period': 'on demand', 'Command': 'Serve', 'Station': '5'},
+     'Period "on demand" is for Read and ReadWrite rows'),
+    ({'Period': 'on demand', 'Command': 'Heartbeat'},
+     'Period = "on demand" should be ms from 100 to 60000'),
+    ({'Period': 'on demand', 'Publish': 'Change'},
+     'a row with Period "on demand" is published each time it is read; leave the cell empty'),
+    ({'Period': 'on demand', 'Address': 'B3:0/0', 'Command': 'Read', 'Alarm': 'WARN'},
+     'Alarm needs a row that is read again and again, not one with Period "on demand"')])
+def test_what_write_again_is_for_and_a_row_on_demand_cannot_have(
+        cells: dict[str, str], expected: str) -> None:
+    cells = cells if 'Period' in cells else {'Write_Again': '1000'} | cells
+    assert any(expected in text for text in faults(row(**cells)))
