@@ -39,13 +39,14 @@ from support.cases import for_all
 from support.ptys import PATIENCE, Pty
 
 
-@for_all(('name', 'text'), [
-    ('/nowhere/tty', 'No such file or directory'), ('/dev/null', 'this is not a serial port'),
-    ('/tmp', 'Is a directory'), ('socket://127.0.0.1:1', 'Connection refused'),
-    ('rfc2217://127.0.0.1:1', 'Connection refused')])
-def test_port_that_cannot_be_opened(name: str, text: str) -> None:
+@for_all(('name', 'listens', 'text'), [
+    *((name, listens, text) for listens in (False, True) for name, text in (
+        ('/nowhere/tty', 'No such file or directory'), ('/dev/null', 'this is not a serial port'),
+        ('socket://127.0.0.1:1', 'Connection refused'))),
+    ('/tmp', False, 'Is a directory'), ('rfc2217://127.0.0.1:1', False, 'Connection refused')])
+def test_port_that_cannot_be_opened(name: str, listens: bool, text: str) -> None:
     with pytest.raises(OSError) as caught:  # noqa: PT011
-        open_port(PortSettings(name))
+        open_port(PortSettings(name, listens=listens))
     assert (caught.value.strerror or str(caught.value)) == text
 
 
@@ -90,16 +91,19 @@ def test_option_that_a_port_has_is_set(pty: Pty, monkeypatch: pytest.MonkeyPatch
     assert asked == [True, True]
 
 
-@pytest.mark.parametrize('listens', [False, True])
+@pytest.mark.parametrize(('listens', 'parity', 'flags'), [
+    (False, 'Odd', termios.PARODD | termios.CRTSCTS), (True, 'Odd', termios.PARODD),
+    (True, 'Even', 0)])
 def test_format_of_characters_is_asked_of_the_system(
-        pty: Pty, listens: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+        pty: Pty, listens: bool, parity: str, flags: int, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[int] = []
     monkeypatch.setattr(termios, 'tcsetattr', lambda port, when, flags: asked.append(flags[2]))
-    with suppress(OSError):  # a pty has no parity
-        open_port(PortSettings(str(pty.name), 9600, 7, 'Odd', 2, True, listens=listens)).close()
-    assert asked[0] & (termios.CSIZE | termios.CSTOPB | termios.PARENB | termios.PARODD
-                       | termios.CRTSCTS) == termios.CS7 | termios.CSTOPB | termios.PARENB \
-        | termios.PARODD | (0 if listens else termios.CRTSCTS)
+    with pytest.raises(OSError, match='this port has no such parity') if listens else suppress(
+            OSError):  # a pty has no parity
+        open_port(PortSettings(str(pty.name), 9600, 7, parity, 2, True, listens=listens)).close()
+    always = termios.CREAD | termios.CLOCAL | termios.CSTOPB | termios.PARENB
+    assert asked[0] & (always | termios.CSIZE | termios.PARODD | termios.CRTSCTS) == (
+        always | termios.CS7 | flags)
 
 
 # Damaged characters

@@ -12,20 +12,25 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Connections to device servers: a server that did not hear of the end of the last one."""
+"""Ports of device servers: plain connections, and the client of RFC 2217."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from errno import EPIPE, ETIMEDOUT
+import os
 import socket
 import threading
 import time
 from unittest.mock import Mock
 
-from abdf1_ros.ports import socket_port
+from abdf1_ros.ports import rfc2217_port, socket_port
+from abdf1_ros.ports.descriptor import DescriptorPort, READ_SIZE
 from abdf1_ros.ports.opening import open_port
+from abdf1_ros.ports.rfc2217_port import Rfc2217Port
 from abdf1_ros.ports.settings import PortSettings
 import pytest
 from support.cases import for_all
+from support.device_server import DeviceServer
 from support.ptys import PATIENCE
 
 _TCP_REPAIR = 19  # of Linux: a socket that is closed in this state sends nothing (CRIU)
@@ -210,3 +215,191 @@ def test_telnet_port_is_named(pieces: list[bytes], is_telnet: bool) -> None:
                 else:
                     assert port.read(PATIENCE, server.fileno()) == piece
         port.close()
+
+
+# The client of RFC 2217
+
+
+# As RFC 854 and RFC 2217 have them.
+WILL_COM_PORT = bytes([255, 251, 44])
+DO_COM_PORT = bytes([255, 253, 44])
+DONT_COM_PORT = bytes([255, 254, 44])
+BAUD_115200 = bytes([255, 250, 44, 101, 0, 1, 0xC2, 0, 255, 240])
+REST = b''.join(bytes([255, 250, 44, command, value, 255, 240])
+                for command, value in ((102, 8), (103, 3), (104, 1)))
+EVEN = PortSettings('', 115200, parity='Even')
+Ends = tuple[Rfc2217Port, socket.socket]
+
+
+@pytest.fixture
+def ends() -> Iterator[Ends]:
+    ours, theirs = socket.socketpair()
+    theirs.settimeout(PATIENCE)
+    yield Rfc2217Port(ours, 'rfc2217://here'), theirs
+    ours.close()
+    theirs.close()
+
+
+def test_connection_sends_at_once_and_notices_a_lost_host() -> None:
+    options = (socket.TCP_NODELAY, socket.TCP_KEEPIDLE, socket.TCP_KEEPINTVL,
+               socket.TCP_USER_TIMEOUT)
+    with DeviceServer() as server:
+        port = open_port(PortSettings(f'rfc2217://127.0.0.1:{server.port}', 19200))
+        assert isinstance(port, Rfc2217Port)
+        assert server.baud == 19200
+        with socket.socket(fileno=os.dup(port.fileno())) as connection:
+            assert [connection.getsockopt(socket.IPPROTO_TCP, option) for option in options] == [
+                1, 5, 1, 5000]
+            assert connection.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE) == 1
+        port.close()
+
+
+def test_host_that_can_have_no_name() -> None:
+    with pytest.raises(OSError, match='is not the name of a host'):
+        open_port(PortSettings(f'socket://{"x" * 70}.local:4001'))
+
+
+@pytest.mark.parametrize('handshake', [False, True])
+def test_settings_are_sent_and_their_answers_taken(ends: Ends, handshake: bool) -> None:
+    port, server = ends
+    accepts = WILL_COM_PORT if handshake else (  # one way is enough, and not each option
+        DO_COM_PORT + bytes([255, 252, 44, 255, 254, 3]))
+    server.sendall(accepts + b'old data' + BAUD_115200 + REST)
+    port.negotiate(replace(EVEN, handshake=handshake))
+    said = server.recv(4096)
+    assert said.startswith(bytes([255, 251, 0, 255, 251, 3]) + WILL_COM_PORT)
+    for command in (bytes([1, 0, 1, 0xC2, 0]), b'\x02\x08', b'\x03\x03', b'\x04\x01',
+                    b'\x05\x03' if handshake else b'\x05\x01', b'\x05\x08', b'\x0c\x03'):
+        assert bytes([255, 250, 44]) + command + bytes([255, 240]) in said
+    assert (b'\x05\x0b\xff' in said) is not handshake  # RTS
+
+
+@pytest.mark.parametrize('short', [
+    bytes([255, 250, 255, 240]), bytes([255, 250, 44, 255, 240]),
+    bytes([255, 250, 44, 101, 255, 240]), bytes([255, 250, 1, 101, 5, 255, 240])])
+def test_option_that_is_short_or_another_answers_nothing(ends: Ends, short: bytes) -> None:
+    port, server = ends
+    server.sendall(DO_COM_PORT + BAUD_115200 + REST + short)
+    port.negotiate(EVEN)
+
+
+@pytest.mark.parametrize(('answer', 'text'), [
+    (DO_COM_PORT + BAUD_115200.replace(b'\x01\xc2\x00', b'\x00\x25\x80') + REST,
+     'does not take Baudrate 115200, its port has 9600'),
+    (DONT_COM_PORT, 'the device server refuses RFC 2217')])
+def test_server_that_refuses(ends: Ends, answer: bytes, text: str) -> None:
+    port, server = ends
+    server.sendall(answer)
+    with pytest.raises(OSError, match=text):
+        port.negotiate(EVEN)
+
+
+@pytest.mark.parametrize(('answer', 'text'), [
+    (b'login: ', 'the other end does not speak RFC 2217'),
+    (DO_COM_PORT[:2] + b'\1', 'the other end does not speak RFC 2217'),
+    (DO_COM_PORT + BAUD_115200, 'does not answer to settings of its port')])
+def test_server_that_does_not_answer(
+        ends: Ends, monkeypatch: pytest.MonkeyPatch, answer: bytes, text: str) -> None:
+    monkeypatch.setattr(rfc2217_port, 'NEGOTIATION_TIMEOUT', 1.0)
+    port, server = ends
+    server.sendall(answer)
+    with pytest.raises(OSError, match=text):
+        port.negotiate(EVEN)
+
+
+def test_server_that_says_something_else_for_ever_is_given_up(
+        ends: Ends, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rfc2217_port, 'NEGOTIATION_TIMEOUT', 0.2)
+    port, server = ends
+    is_over = threading.Event()
+
+    def drip() -> None:
+        while not is_over.wait(0.02):
+            server.sendall(b'.')
+
+    dripping = threading.Timer(PATIENCE, is_over.set)
+    dripping.start()
+    threading.Thread(target=drip, daemon=True).start()
+    with pytest.raises(OSError, match='does not speak RFC 2217'):
+        port.negotiate(EVEN)
+    assert not is_over.is_set()
+    is_over.set()
+    dripping.cancel()
+
+
+def test_connection_to_a_server_that_does_not_answer_is_closed(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rfc2217_port, 'NEGOTIATION_TIMEOUT', 0.05)
+    with socket.create_server(('127.0.0.1', 0)) as server:
+        with pytest.raises(OSError) as error:  # it keeps the port from being thrown away
+            open_port(PortSettings(f'rfc2217://127.0.0.1:{server.getsockname()[1]}'))
+        connection, _ = server.accept()
+        with connection:
+            connection.settimeout(PATIENCE)
+            while connection.recv(4096):
+                pass
+    assert 'the other end is silent: another host may have its port' in str(error.value)
+
+
+def read(port: Rfc2217Port, wake: int, size: int) -> bytes:
+    """Return so many bytes of the line."""
+    data = b''
+    while len(data) < size:
+        data += port.read(PATIENCE, wake)
+    return data
+
+
+@pytest.mark.parametrize('stream', [b'\xff\xf1' * READ_SIZE, b'\xff\xff' * READ_SIZE])
+def test_commands_count_for_whether_there_is_more(ends: Ends, wake: int, stream: bytes) -> None:
+    port, server = ends
+    server.sendall(stream)
+    for _ in range(2):
+        assert len(port.read(PATIENCE, wake)) in (0, READ_SIZE // 2)
+        assert port.has_more
+    server.sendall(b'x')
+    assert port.read(PATIENCE, wake) == b'x'
+    assert not port.has_more
+
+
+@pytest.mark.parametrize('chunk', [1, 2, 3, 1000])
+def test_data_are_what_is_no_command(ends: Ends, wake: int, chunk: int) -> None:
+    port, server = ends
+    stream = b'a\xff\xffb' + bytes([255, 253, 1]) + b'c' + bytes([255, 241]) + \
+        bytes([255, 250, 44, 107, 255, 255, 7, 255, 240]) + b'd\xff\xff'
+    data = b''
+    for at in range(0, len(stream), chunk):
+        server.sendall(stream[at:at + chunk])
+        data += port.read(PATIENCE, wake)
+    assert data == b'a\xffbcd\xff'
+    assert server.recv(100) == bytes([255, 252, 1])  # WONT ECHO
+
+
+def test_offer_that_is_not_ours_is_refused_once(ends: Ends, wake: int) -> None:
+    port, server = ends
+    server.sendall(bytes([255, 251, 1, 255, 252, 5, 255, 251, 3]) + b'x')
+    assert read(port, wake, 1) == b'x'
+    assert server.recv(100) == bytes([255, 254, 1])  # DONT ECHO; SGA was asked for
+
+
+def test_data_that_look_like_commands_are_doubled(ends: Ends) -> None:
+    port, server = ends
+    port.write(b'\x10\xff\x02')
+    assert server.recv(100) == b'\x10\xff\xff\x02'
+
+
+def test_suboption_without_an_end_is_given_up(ends: Ends, wake: int) -> None:
+    port, server = ends
+    server.sendall(bytes([255, 250, 44]) + bytes(400))
+    with pytest.raises(OSError, match='sends bytes that are not RFC 2217'):
+        for _ in range(2):
+            port.read(PATIENCE, wake)
+
+
+def test_data_that_nobody_reads_stay_with_the_server(ends: Ends) -> None:
+    port, server = ends
+    server.settimeout(0.2)
+    sent = 0
+    with pytest.raises(TimeoutError):
+        while sent < 100_000_000:
+            sent += server.send(bytes(65536))
+    assert sent < 10_000_000

@@ -12,20 +12,175 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Listening on a port, and between two."""
+"""Listening: to ports for reading alone, without a signal or byte, and between two ports."""
 
+import errno
+import fcntl
 import math
 import os
 from pathlib import Path
+import select
 import termios
+from typing import Any
 
+from abdf1_ros.df1.frames import Damaged
+from abdf1_ros.df1.listen import SecondPort
+from abdf1_ros.ports import listening
+from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.ports.opening import open_port
+from abdf1_ros.ports.serial_device import SerialDevice
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.tap import is_pty, Tap
+from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.sniffer.capture import Chunk, Direction
 import pytest
+import serial
 from support.cases import for_all
-from support.ptys import PATIENCE, Pty, read_exactly
+from support.listening import ListeningBench
+from support.mappings import make_mapping
+from support.ptys import PATIENCE, Pty, read_exactly, wait_until
+
+# What changes RTS, DTR or the line, of a terminal.
+SIGNALS = {termios.TIOCMSET, termios.TIOCMBIS, termios.TIOCMBIC,
+           0x5427, 0x5428, termios.TCSBRK, termios.TCSBRKP}  # also TIOCSBRK and TIOCCBRK
+COMMAND = bytes.fromhex('10 01 02 10 02 02 00 0F 00 02 00 01 00 00 03 00 06 07 07 06 10 03 6E A0')
+POLL = bytes.fromhex('10 05 02 FE')
+REPLY = bytes.fromhex('10 02 00 02 4F 00 02 00 00 00 00 00 00 00 10 03 C5 73')
+
+
+def listening_to(*ptys: Pty, **others: Any) -> PortSettings:
+    first, *more = (str(pty.name) for pty in ptys)
+    return PortSettings(first, listens=True, second=''.join(more), **others)
+
+
+def test_bytes_and_signals_stay_as_they_are(ptys: list[Pty], monkeypatch: Any) -> None:
+    """The bridge listens to a whole transaction; the far end gets nothing at all."""
+    asked: list[int] = []
+    flags: list[int] = []
+    real_ioctl, real_open = fcntl.ioctl, os.open
+
+    def ioctl(descriptor: int, request: int, *args: Any) -> Any:
+        asked.append(request)
+        return real_ioctl(descriptor, request, *args)
+
+    def open_(name: Any, how: int, *args: Any, **others: Any) -> int:
+        if str(name) == str(ptys[0].name):
+            flags.append(how)
+        return real_open(name, how, *args, **others)
+
+    def refuse(*args: object, **others: object) -> None:
+        raise AssertionError('pyserial sets RTS and DTR when it opens a port')
+
+    monkeypatch.setattr(fcntl, 'ioctl', ioctl)
+    monkeypatch.setattr(os, 'open', open_)
+    monkeypatch.setattr(serial, 'Serial', refuse)
+    mapping = make_mapping('N7:7', length=3, station=2, period=500)
+    bench = ListeningBench([mapping])
+    link = LinkThread(bench.machine, PortOpener(listening_to(ptys[0])).open)
+    link.start()
+    try:
+        wait_until(lambda: link.state.is_open)
+        for byte in COMMAND + b'\x10\x06' + POLL + REPLY + b'\x10\x06':
+            ptys[0].write(bytes((byte,)))
+        wait_until(lambda: bool(bench.listener.reads))
+    finally:
+        link.stop()
+    assert bench.values(mapping) == [[0, 0, 0]]
+    assert not select.select([ptys[0].fileno()], [], [], 0.3)[0], os.read(ptys[0].fileno(), 100)
+    assert not SIGNALS.intersection(asked)
+    assert flags == [os.O_RDONLY | os.O_NOCTTY | os.O_NONBLOCK]
+    assert bench.driver.counters.chars_sent == 0
+
+
+def test_port_for_reading_takes_no_byte(ptys: list[Pty]) -> None:
+    port = open_port(listening_to(ptys[0]))
+    with pytest.raises(OSError, match='only listens to this port'):
+        port.write(b'A')
+    assert isinstance(port, listening.ListeningDevice)
+    with pytest.raises(OSError) as caught:  # nor does the system
+        os.write(port.fileno(), b'A')
+    assert caught.value.errno == errno.EBADF
+    assert fcntl.fcntl(port.fileno(), fcntl.F_GETFL) & os.O_ACCMODE == os.O_RDONLY
+    port.close()
+
+
+def test_what_a_program_leaves_at_its_end_is_not_changed(ptys: list[Pty]) -> None:
+    descriptor = os.open(ptys[0].name, os.O_RDWR | os.O_NOCTTY)
+    for hangs_up in (termios.HUPCL, 0):
+        attributes = termios.tcgetattr(descriptor)
+        attributes[2] = attributes[2] & ~termios.HUPCL | hangs_up
+        termios.tcsetattr(descriptor, termios.TCSANOW, attributes)
+        open_port(listening_to(ptys[0], baud=19200)).close()
+        after = termios.tcgetattr(descriptor)
+        assert after[2] & termios.HUPCL == hangs_up
+        assert not after[2] & termios.CRTSCTS
+        assert after[4:6] == [termios.B19200, termios.B19200]
+        assert after[3] == 0  # raw: nothing is echoed
+    os.close(descriptor)
+
+
+def test_two_ports_are_told_apart(ptys: list[Pty], pipe: tuple[int, int]) -> None:
+    ptys[0].write(b'from before\n')
+    port = open_port(listening_to(*ptys))
+    wake, end = pipe
+    ptys[0].write(b'first')
+    assert (data := port.read(5.0, wake)) == b'first'
+    assert not isinstance(data, SecondPort)
+    ptys[1].write(b'second')
+    assert (data := port.read(5.0, wake)) == b'second'
+    assert isinstance(data, SecondPort)
+    assert port.read(0.01, wake) == b''
+    os.write(end, b'!')
+    assert port.read(None, wake) == b''
+    port.close()
+
+
+def test_both_ports_are_for_one_program(ptys: list[Pty]) -> None:
+    port = open_port(listening_to(*ptys))
+    for pty in ptys:
+        with pytest.raises(OSError, match='another program has it open'):
+            open_port(listening_to(pty))
+        with pytest.raises(OSError, match='another program has it open'):
+            open_port(PortSettings(str(pty.name)))
+    port.close()
+    open_port(listening_to(ptys[1])).close()
+    # Where the second is not there, the first is given back.
+    with pytest.raises(OSError, match='No such file'):
+        open_port(PortSettings(str(ptys[0].name), listens=True, second='/nowhere/tty'))
+    open_port(listening_to(ptys[0])).close()
+    other = os.open(ptys[0].name, os.O_RDWR | os.O_NOCTTY)
+    fcntl.flock(other, fcntl.LOCK_EX)  # as other programs reserve a device
+    with pytest.raises(OSError, match='another program has it open'):
+        open_port(listening_to(ptys[0]))
+    os.close(other)
+
+
+def test_damaged_characters_of_either_port_are_damaged(ptys: list[Pty], wake: int) -> None:
+    opened = [listening.open_device(listening_to(pty)) for pty in ptys]
+    ports = [listening.ListeningDevice(port.fileno(), port.close, is_marked=True)
+             for port in opened]  # a pty has no parity
+    for pty in ptys:
+        pair = listening.TwoPorts(ports[0], ports[1])
+        pty.write(b'a\xFF\x00Ab')
+        pieces = [pair.read(1.0, wake) for _ in range(3)]  # none waits for what comes next
+        assert pieces == [b'a', b'A', b'b']
+        assert isinstance(pieces[1], Damaged)
+        assert isinstance(pieces[2], SecondPort) is (pty is ptys[1])
+    for port in ports:
+        port.close()
+
+
+def test_errors_of_both_ports_are_counted(
+        ptys: list[Pty], monkeypatch: pytest.MonkeyPatch) -> None:
+    """They were not counted at all."""
+    opener = PortOpener(listening_to(*ptys))
+    port = opener.open()
+    monkeypatch.setattr(SerialDevice, 'errors', lambda self: {'parity errors': 2, 'overruns': 1})
+    assert opener.errors() == {'parity errors': 4, 'overruns': 2}
+    port.close()
+
+
+# Between two ports
 
 
 def tap(*names: object) -> Tap:
