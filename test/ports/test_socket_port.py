@@ -24,7 +24,7 @@ import time
 from unittest.mock import Mock
 
 from abdf1_ros.ports import rfc2217_port, socket_port
-from abdf1_ros.ports.descriptor import DescriptorPort, READ_SIZE
+from abdf1_ros.ports.descriptor import READ_SIZE
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.rfc2217_port import Rfc2217Port
 from abdf1_ros.ports.settings import PortSettings

@@ -246,12 +246,3 @@ def test_help_has_examples_and_exit_statuses(command: str, capsys: Output) -> No
     assert 'exit status:' in said.out
     assert f'plc {command}' in said.out.partition('example')[2]
     assert 'a running watch or ping ends with 0 or 1 instead' in said.out
-
-
-def test_process_needs_no_ros() -> None:
-    program = ('import sys; sys.modules["rclpy"] = None; '
-               'from abdf1_ros.cli.plc.command import main; sys.exit(main())')
-    said = subprocess.run([sys.executable, '-c', program, 'read', 'N7:0'], text=True,
-                          capture_output=True, timeout=30, check=False)
-    assert (said.returncode, said.stdout) == (2, '')
-    assert said.stderr.startswith('plc: --port: name the port')

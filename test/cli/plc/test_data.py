@@ -29,8 +29,6 @@ from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.rows import Rows
 from abdf1_ros.settings.scaling import Scaling
-from hypothesis import given
-from hypothesis import strategies as st
 import pytest
 from support.cases import for_all
 from support.mappings import make_mapping
@@ -117,7 +115,7 @@ def test_values_have_the_tags_of_their_own_addresses() -> None:
 
 
 @for_all(('address', 'kind', 'texts', 'values'), [
-    ('N7:0', '', ['5', '-6', '0x1F', '0b11', '007'], [5, -6, 31, 3, 7]),
+    ('N7:0', '', ['5', '-6', '0x1F', '0b11', '0o17', '007'], [5, -6, 31, 3, 15, 7]),
     ('F8:0', '', ['1.5', '1e3', '2,5'], [1.5, 1000, 2.5]), ('B3:0/0', '', ['1', '0'], [1, 0]),
     ('ST9:0', '', ['a b'], 'a b'), ('N7:0', 'bcd16', ['1234'], [1234])])
 def test_text_becomes_values_of_the_type(
@@ -189,14 +187,6 @@ def test_processor_that_says_what_it_is(processor: Processor | None, cell: str) 
     ('a [\x1b]', r'\x1b'), ('b []', ''), ('a [plant with halls]', '')])
 def test_unit_of_a_description(text: str, unit: str) -> None:
     assert data.unit_of(make('N7:0', Description=text)) == unit
-
-
-@given(st.integers(-32768, 32767))
-def test_whole_numbers_in_every_notation(value: int) -> None:
-    mapping = make('N7:0')
-    assert data.parse_values(mapping, [str(value)]) == [value]
-    if value >= 0:
-        assert data.parse_values(mapping, [hex(value), bin(value), oct(value)]) == [value] * 3
 
 
 @for_all(('address', 'kind', 'texts', 'length'), [

@@ -220,11 +220,6 @@ def test_other_forms_of_text_are_read_as_well(
         ['DOOR_CLOSED', 'LINE_SPEED', 'T4_0', 'WAIT'], [])
 
 
-def test_bit_addresses_alone_are_an_export_too(tmp_path: Path) -> None:
-    (mapping,), _ = imported(tmp_path, '"B3/20","Global","DOOR","","","","",""\n')
-    assert str(mapping.address) == 'B3:1/4'
-
-
 def test_read_only_rows_of_several_stations_with_a_longer_period(tmp_path: Path) -> None:
     rows = ('"Speed","N7:0",Short,1,R/W,100,Linear,0,100,0,10,Float,1,1,,"",\n'
             '"Slow","N7:1",Short,1,RO,5000,,,,,,,,,,"",\n'

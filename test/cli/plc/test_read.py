@@ -49,6 +49,7 @@ from support.simulator_process import Files
     (2, 'L10:0', ('--length', '2'), ['L10:0 -70000 2000000000']),
     (2, 'N7:40', ('--type', 'int32'), ['N7:40 131071']),
     (2, 'N7:30', ('--type', 'bcd16', '--length', '2'), ['N7:30 1234 99']),
+    (2, 'N7:10', ('--length', '3', '--radix', 'HEX'), ['N7:10 0065 0066 0067']),
     (2, 'ST9:1', (), ["ST9:1 'Tank 4'"]), (2, 'F8:4', (), ['F8:4 21.5'])])
 def test_read_shows_address_and_values(
         plc: Plc, station: int, address: str, options: tuple[str, ...], lines: list[str]) -> None:
@@ -231,11 +232,6 @@ def test_read_goes_on_after_a_refusal(plc: Plc, tmp_path: Path) -> None:
     said = plc('read', 'far', '--map', str(path))
     assert said.err.startswith('plc: far (N99:0) of station 2: STS ')
     assert plc('read', '--map', str(path), *FAST).err.splitlines()[-1].startswith('plc: sent: ')
-
-
-def test_read_in_another_radix(plc: Plc) -> None:
-    said = plc('read', 'N7:10', '--length', '3', '--station', '2', '--radix', 'HEX')
-    assert said.lines == ['N7:10 0065 0066 0067']
 
 
 def test_read_over_a_net_file(line: str, files: Files, capsys: Output) -> None:

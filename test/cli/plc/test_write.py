@@ -193,9 +193,10 @@ def test_write_that_does_not_fit_the_family_of_the_plc(plc: Plc) -> None:
     (('write', 'N7:0', '99999'), 'N7:0: "99999" is not a valid int16, a whole number from -32768 '
                                  'to 32767'),
     (('write', 'F8:0', '1,000'), 'F8:0: "1,000" could be two numbers; write 1000 or 1.000'),
-    (('write', 'ST9:0', 'Tank', '5'), 'ST9:0: takes one text; quote it if it has spaces'),
-    (('write', 'T4:0', '5'), 'ADDRESS "T4:0": T4:0 belongs to the processor; of such an element '
-                             'can be written: PRE, ACC, EN, TT, DN'),
+    (('write', 'ST9:0', 'Tank', '5', '--plc-type', 'SLC'),
+     'ST9:0: takes one text; quote it if it has spaces'),
+    (('write', 'T4:0', '5', '--plc-type', 'SLC'), 'ADDRESS "T4:0": T4:0 belongs to the processor; '
+     'of such an element can be written: PRE, ACC, EN, TT, DN'),
     (('write', 'N7:250', *'0123456', '--plc-type', 'SLC'),
      'VALUE: 7 elements do not fit at N7:250; the last word there can be is N7:255')])
 def test_what_no_plc_could_take_is_told_before_the_port_is_opened(
