@@ -123,22 +123,6 @@ def test_every_value_of_every_file_type_goes_there_and_back(place: tuple[PlcType
         assert dialect.read_data(start, layout.words, reply) == stored[:2 * layout.words]
 
 
-@for_all('place', FLOATS)
-def test_every_named_bit_is_set_alone(place: tuple[PlcType, Access]) -> None:
-    family, dialect = place[0], dialect_of(*place)
-    for kind in FAMILIES[family].file_types:
-        for name, member in FAMILIES[family].layout(kind).members.items():
-            if member.bit is None:
-                continue
-            address = parse_address(f'{kind.value}9:1/{name}', family)
-            table = DataTable(family)
-            table.create(address, 1)
-            mask = 1 << member.bit
-            word = address.at_offset(address.offset)
-            assert replied(table, *dialect.write_bits(word, mask, mask)) == b''
-            assert table.read(word, 1) == mask.to_bytes(2, 'little')
-
-
 def test_processor_is_for_an_slc_only() -> None:
     with pytest.raises(FormatError, match='^a PLC-5 has no Processor$'):
         dialect_of(PlcType.PLC5, None, Processor.SLC_5_03)

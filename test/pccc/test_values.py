@@ -242,16 +242,6 @@ def test_fault_says_what_may_be_written() -> None:
     assert str(write_fault(at('MG9:0.0', SLC), ValueType.INT16, 1)).endswith('written: nothing')
 
 
-def test_reader_takes_fields_in_order() -> None:
-    reader = Reader(bytes(range(8)))
-    assert (reader.byte(), reader.word(), reader.take(2)) == (0, 0x0201, b'\x03\x04')
-    assert not reader.is_empty
-    assert reader.rest() == b'\x05\x06\x07'
-    assert reader.is_empty
-    assert reader.rest() == b''
-    reader.end()
-
-
 def test_end_names_what_is_too_much() -> None:
     reader = Reader(b'abc')
     reader.byte()

@@ -24,13 +24,12 @@ from abdf1_ros.ports.trace import PortOpener, Trace, TracedPort
 from abdf1_ros.sniffer.capture import CaptureWriter, Chunk, Direction, read_capture
 import pytest
 from support.counting import open_files
+from support.link_threads import NoLine
 from support.ptys import no_file_longer_than, PATIENCE, Pty
 
 
-class Loop:
+class Loop(NoLine):
     """A port that gives back what it is given."""
-
-    has_more = is_terminal = False
 
     def __init__(self) -> None:
         self.data = b''
@@ -42,10 +41,6 @@ class Loop:
 
     def write(self, data: bytes) -> None:
         self.data += data
-
-    def unsent(self) -> int:
-        """Return 0: all has left."""
-        return 0
 
     def close(self) -> None:
         self.closed = True

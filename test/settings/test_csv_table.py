@@ -77,12 +77,6 @@ def test_lines_and_items_are_counted_across_comments_and_blanks(path: Path) -> N
         (1, 6), (2, 8), (3, 10), (4, 12)]
 
 
-def test_lines_are_counted_with_any_line_ends(path: Path) -> None:
-    for end in ('\n', '\r\n', '\r'):
-        content = end.join(['# c', 'Tag,Address', '', 'a,1', '# c', 'b,2', ''])
-        assert [row.line for row in rows_of(path, content)] == [4, 6], repr(end)
-
-
 @pytest.mark.parametrize('separator', ['\x0b', '\x0c', '\x1c', '\x85', '\u2028', '\u2029'])
 def test_only_line_ends_end_a_line(path: Path, separator: str) -> None:
     rows = rows_of(path, f'Tag,Address\na{separator}b,1\nc,2\n')

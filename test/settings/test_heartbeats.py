@@ -238,7 +238,8 @@ def test_rule_13_what_values_cannot_depend_on(cells: dict[str, str], text: str) 
 @for_all(('cells', 'text'), [
     ({'Command': 'Write'}, 'is not a Read row'), ({'Length': '2'}, 'is not one int16'),
     ({'Address': 'F8:0'}, 'is not one int16'),
-    ({'While': 'RUN'}, 'depends on something itself')])
+    ({'While': 'RUN'}, 'depends on something itself'),
+    ({'Period': 'on demand'}, '"counter" is read only on demand')])
 def test_rule_13_what_is_no_counter(cells: dict[str, str], text: str) -> None:
     assert text in faults(row(**DOORS), row(**COUNTER | cells))[0]
 

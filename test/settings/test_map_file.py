@@ -419,14 +419,6 @@ def test_row_on_demand_has_no_period_and_promises_nothing() -> None:
     assert cell_of(row, 'Period') == 'on demand'
 
 
-def test_row_on_demand_is_no_counter() -> None:
-    counter = row(Tag='counter', Command='Read', Period='on demand')
-    guarded = row(Tag='guarded', Command='Read', Address='N7:1', While='counter',
-                  While_Timeout='5000')
-    told = faults(counter, guarded)
-    assert [text for text in told if '"counter" is read only on demand' in text]
-
-
 @for_all(('cells', 'expected'), [
     ({'Command': 'Read'}, 'a Read row has no Write_Again: it is for Write and ReadWrite rows'),
     ({'Command': 'Heartbeat'}, 'a Heartbeat row has no Write_Again'),
