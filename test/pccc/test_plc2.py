@@ -126,12 +126,6 @@ def test_compatibility_file_of_a_plc5_has_the_number_of_the_station_that_asks() 
     assert ask(table(PLC5, C5_0=counting(9)), '08 00 04', 0x01) == (0, '04 00 05 00')
 
 
-@for_all('family', [PLC3, PLC5, SLC])
-@for_all(('cmd', 'data'), [(0x01, '00 00 02'), (0x08, '00 00 01 00')])
-def test_without_a_compatibility_file(family: PlcType, cmd: int, data: str) -> None:
-    assert ask(table(family, N7_0='00 00'), data, cmd) == (0x50, '')
-
-
 def test_compatibility_file_of_a_plc3_is_an_input_file() -> None:
     memory = table(PLC3, I5_0=counting(8), N5_0='FF FF')
     assert ask(memory, '04 00 04', 0x01) == (0, '02 00 03 00')
@@ -156,8 +150,11 @@ def test_common_interface_file_gives_an_odd_number_of_bytes() -> None:
     assert ask(memory, '00 00 05', 0x01) == (0x50, '')
 
 
-@for_all(('cmd', 'data'), [
-    (0x00, '00 00 01 00'), (0x02, '00 00 01 00'), (0x05, '00 00 01 00'),
-    (0x01, '00 00 ED'), (0x08, '00 00' + ' 00' * 236)])
-def test_what_an_slc_has_not(cmd: int, data: str) -> None:
-    assert ask(table(SLC, N9_0=counting(200)), data, cmd) == (0x10, '')
+@for_all(('memory', 'cmd', 'data', 'sts'), [
+    *((table(SLC, N9_0=counting(200)), cmd, data, 0x10) for cmd, data in (  # an SLC has not
+        (0x00, '00 00 01 00'), (0x02, '00 00 01 00'), (0x05, '00 00 01 00'),
+        (0x01, '00 00 ED'), (0x08, '00 00' + ' 00' * 236))),
+    *((table(family, N7_0='00 00'), cmd, data, 0x50) for family in (PLC3, PLC5, SLC)
+      for cmd, data in ((0x01, '00 00 02'), (0x08, '00 00 01 00')))])  # without such a file
+def test_what_other_families_refuse(memory: DataTable, cmd: int, data: str, sts: int) -> None:
+    assert ask(memory, data, cmd) == (sts, '')

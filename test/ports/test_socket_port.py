@@ -286,19 +286,11 @@ def test_option_that_is_short_or_another_answers_nothing(ends: Ends, short: byte
 @pytest.mark.parametrize(('answer', 'text'), [
     (DO_COM_PORT + BAUD_115200.replace(b'\x01\xc2\x00', b'\x00\x25\x80') + REST,
      'does not take Baudrate 115200, its port has 9600'),
-    (DONT_COM_PORT, 'the device server refuses RFC 2217')])
-def test_server_that_refuses(ends: Ends, answer: bytes, text: str) -> None:
-    port, server = ends
-    server.sendall(answer)
-    with pytest.raises(OSError, match=text):
-        port.negotiate(EVEN)
-
-
-@pytest.mark.parametrize(('answer', 'text'), [
+    (DONT_COM_PORT, 'the device server refuses RFC 2217'),
     (b'login: ', 'the other end does not speak RFC 2217'),
     (DO_COM_PORT[:2] + b'\1', 'the other end does not speak RFC 2217'),
     (DO_COM_PORT + BAUD_115200, 'does not answer to settings of its port')])
-def test_server_that_does_not_answer(
+def test_server_that_refuses_or_does_not_answer(
         ends: Ends, monkeypatch: pytest.MonkeyPatch, answer: bytes, text: str) -> None:
     monkeypatch.setattr(rfc2217_port, 'NEGOTIATION_TIMEOUT', 1.0)
     port, server = ends
