@@ -118,13 +118,9 @@ def check_plan(mappings: Sequence[Mapping], blocks: Sequence[Block]) -> None:
             assert len({mapping.codec.words for mapping in block.mappings}) == 1
 
 
-@given(word_mappings())
-def test_every_word_is_covered_within_the_limits(mappings: list[Mapping]) -> None:
-    check_plan(mappings, plan(*mappings))
-
-
-@given(mixed_mappings())
-def test_nothing_is_bridged_across_files_stations_and_families(mappings: list[Mapping]) -> None:
+@given(word_mappings() | mixed_mappings())
+def test_every_word_is_covered_and_nothing_is_bridged_across_files_stations_and_families(
+        mappings: list[Mapping]) -> None:
     blocks = plan(*mappings)
     check_plan(mappings, blocks)
     for block in blocks:

@@ -43,30 +43,7 @@ class NewestClientServer:
     def __init__(self) -> None:
         self.listening = socket.create_server(('127.0.0.1', 0))
         self.address = self.listening.getsockname()
-        threading.Thread(target=self._accept, daemon=True).start()
-
-    def _accept(self) -> None:
-        client: socket.socket | None = None
-        while True:
-            try:
-                newest, _ = self.listening.accept()
-            except OSError:
-                return
-            newest.sendall(b'!')
-            if client is not None:
-                client.close()
-            client = newest
-
-    def close(self) -> None:
-        self.listening.close()
-
-
-class OneClientServer:
-    """A server that takes one client, and closes the connections of all others at once."""
-
-    def __init__(self) -> None:
-        self.listening = socket.create_server(('127.0.0.1', 0))
-        self.url = f'socket://127.0.0.1:{self.listening.getsockname()[1]}'
+        self.url = f'socket://127.0.0.1:{self.address[1]}'
         self._client: socket.socket | None = None
         threading.Thread(target=self._accept, daemon=True).start()
 
@@ -76,11 +53,29 @@ class OneClientServer:
                 connection, _ = self.listening.accept()
             except OSError:
                 return
-            if self._client is None:
-                self._client = connection
-                threading.Thread(target=self._serve, args=(connection,), daemon=True).start()
-            else:
-                connection.close()
+            self._take(connection)
+
+    def _take(self, connection: socket.socket) -> None:
+        connection.sendall(b'!')
+        if self._client is not None:
+            self._client.close()
+        self._client = connection
+
+    def close(self) -> None:
+        self.listening.close()
+        if self._client is not None:
+            self._client.close()
+
+
+class OneClientServer(NewestClientServer):
+    """A server that takes one client, and closes the connections of all others at once."""
+
+    def _take(self, connection: socket.socket) -> None:
+        if self._client is None:
+            self._client = connection
+            threading.Thread(target=self._serve, args=(connection,), daemon=True).start()
+        else:
+            connection.close()
 
     def _serve(self, connection: socket.socket) -> None:
         try:
@@ -90,11 +85,6 @@ class OneClientServer:
             pass
         connection.close()
         self._client = None
-
-    def close(self) -> None:
-        self.listening.close()
-        if self._client is not None:
-            self._client.close()
 
 
 @pytest.fixture
@@ -147,18 +137,17 @@ def test_local_port_that_is_not_free_yet_is_no_obstacle(server: OneClientServer)
 def test_client_that_is_thrown_out_again_and_again_is_told_of_the_other_one(
         monkeypatch: pytest.MonkeyPatch) -> None:
     server = NewestClientServer()
-    url = 'socket://{}:{}'.format(*server.address)
     said = []
     moments = Mock(side_effect=[0.0, 1.0, 2.0, 11.0, 13.0, 14.0, 15.0])  # of all ends
     monkeypatch.setattr(socket_port, 'time', Mock(monotonic=moments))
     for _ in range(5):
-        port = open_port(PortSettings(url))
+        port = open_port(PortSettings(server.url))
         assert port.read(PATIENCE, port.fileno()) == b'!'  # type: ignore[attr-defined]
         with socket.create_connection(server.address), pytest.raises(OSError) as caught:
             port.read(PATIENCE, port.fileno())  # type: ignore[attr-defined]
         port.close()
         said.append(str(caught.value))
-    port = open_port(PortSettings(url))
+    port = open_port(PortSettings(server.url))
     monkeypatch.setattr('os.write', Mock(side_effect=BrokenPipeError(EPIPE, 'Broken pipe')))
     with pytest.raises(OSError, match='Broken pipe, 3 times within 10 s: another client'):
         port.write(b'?')

@@ -221,27 +221,25 @@ def test_rule_13_values_depend_on_run_or_on_a_counter() -> None:
         'counter', '1000')
 
 
-@for_all(('cells', 'text'), [
-    ({'Command': 'ReadWrite'}, 'a ReadWrite row has no While: it is for Read and '
-     'Heartbeat rows'),
-    ({'Publish': 'Change'}, 'needs Publish Always'),
-    ({'Publish': 'Change', 'While': 'RUN', 'While_Timeout': ''}, 'needs Publish Always'),
-    ({'While': 'RUN'}, 'RUN has no While_Timeout'),
-    ({'While': 'doors'}, 'cannot depend on itself'),
-    ({'While': 'nobody'}, 'should be RUN or the tag of one good Read row'),
-    ({'While': ''}, 'While_Timeout is for a row with While'),
-    ({'Station': '2'}, 'is of station 1; a counter of the same PLC is needed')])
-def test_rule_13_what_values_cannot_depend_on(cells: dict[str, str], text: str) -> None:
-    assert text in faults(row(**DOORS | cells), row(**COUNTER))[0]
-
-
-@for_all(('cells', 'text'), [
-    ({'Command': 'Write'}, 'is not a Read row'), ({'Length': '2'}, 'is not one int16'),
-    ({'Address': 'F8:0'}, 'is not one int16'),
-    ({'While': 'RUN'}, 'depends on something itself'),
-    ({'Period': 'on demand'}, '"counter" is read only on demand')])
-def test_rule_13_what_is_no_counter(cells: dict[str, str], text: str) -> None:
-    assert text in faults(row(**DOORS), row(**COUNTER | cells))[0]
+@for_all(('cells', 'counter', 'text'), [
+    *((cells, {}, text) for cells, text in (
+        ({'Command': 'ReadWrite'}, 'a ReadWrite row has no While: it is for Read and '
+         'Heartbeat rows'),
+        ({'Publish': 'Change'}, 'needs Publish Always'),
+        ({'Publish': 'Change', 'While': 'RUN', 'While_Timeout': ''}, 'needs Publish Always'),
+        ({'While': 'RUN'}, 'RUN has no While_Timeout'),
+        ({'While': 'doors'}, 'cannot depend on itself'),
+        ({'While': 'nobody'}, 'should be RUN or the tag of one good Read row'),
+        ({'While': ''}, 'While_Timeout is for a row with While'),
+        ({'Station': '2'}, 'is of station 1; a counter of the same PLC is needed'))),
+    *(({}, counter, text) for counter, text in (
+        ({'Command': 'Write'}, 'is not a Read row'), ({'Length': '2'}, 'is not one int16'),
+        ({'Address': 'F8:0'}, 'is not one int16'),
+        ({'While': 'RUN'}, 'depends on something itself'),
+        ({'Period': 'on demand'}, '"counter" is read only on demand')))])
+def test_rule_13_what_values_cannot_depend_on(
+        cells: dict[str, str], counter: dict[str, str], text: str) -> None:
+    assert text in faults(row(**DOORS | cells), row(**COUNTER | counter))[0]
 
 
 @pytest.mark.parametrize('timeout', ['', '1000'])

@@ -123,10 +123,12 @@ def test_lost_poll_is_no_reason_to_find_nothing(tmp_path: Path) -> None:
 
 
 class Particular(FullDuplexPeer):
-    """A full-duplex port that passes over what is not for its own station, which is 1."""
+    """A full-duplex port that passes over what is not for its own station."""
+
+    station = 1
 
     def _message(self, frame: Frame) -> bytes:
-        return super()._message(frame) if frame.data[:1] == b'\x01' else b''
+        return super()._message(frame) if frame.data[:1] == bytes((self.station,)) else b''
 
 
 def test_full_duplex_port_that_compares_stations_is_found(tmp_path: Path) -> None:
@@ -138,11 +140,10 @@ def test_full_duplex_port_that_compares_stations_is_found(tmp_path: Path) -> Non
     assert trying == ['9600 baud, full duplex, CRC, station 1']  # that of plc without --station
 
 
-class Other(FullDuplexPeer):
-    """A full-duplex port that passes over what is not for its own station, which is 0."""
+class Other(Particular):
+    """One whose own station is 0."""
 
-    def _message(self, frame: Frame) -> bytes:
-        return super()._message(frame) if frame.data[:1] == b'\0' else b''
+    station = 0
 
 
 def test_full_duplex_port_with_station_0_is_found_and_named(
