@@ -50,6 +50,12 @@ def capture(tmp_path: Path) -> str:
     return str(path)
 
 
+def unpacked(path: str | Path) -> dict[str, str]:
+    """Return the text of each file of a bundle."""
+    with ZipFile(path) as bundle:
+        return {name: bundle.read(name).decode() for name in bundle.namelist()}
+
+
 def bundle_of(tmp_path: Path, capture: str, *options: str) -> dict[str, str]:
     """Return the files of a bundle."""
     (tmp_path / 'map.csv').write_text(
@@ -59,8 +65,7 @@ def bundle_of(tmp_path: Path, capture: str, *options: str) -> dict[str, str]:
     path = str(tmp_path / 'report.zip')
     assert main([capture, '--summary', '--report', path, '--settings', str(tmp_path / 'map.csv'),
                  '--conformance', str(tmp_path / 'slave.json'), *options]) == 0
-    with ZipFile(path) as bundle:
-        return {name: bundle.read(name).decode() for name in bundle.namelist()}
+    return unpacked(path)
 
 
 def test_bundle_has_all_that_a_report_needs(
@@ -142,8 +147,7 @@ def test_anonymous_bundle_has_no_name_of_a_host_user_path_or_port(
     paths = [str(folder / name) for name in files]
     assert main([str(recorded), '--summary', '--report', str(report), '--anonymous',
                  '--settings', *paths[:7], '--conformance', *paths[7:]]) == 0
-    with ZipFile(report) as bundle:
-        found = {name: bundle.read(name).decode() for name in bundle.namelist()}
+    found = unpacked(report)
     everything = '\n'.join([*found, *found.values()]).lower()
     assert [name for name in NAMES if name in everything] == []
     assert found['settings/net.csv'] == (
@@ -181,18 +185,16 @@ def test_processor_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str],
     path.write_text('\n'.join([*lines, '']), encoding='ascii')
     report = tmp_path / 'report.zip'
     assert main([str(path), '--summary', '--report', str(report)]) == 0
-    with ZipFile(report) as bundle:
-        text = bundle.read('processors.txt').decode()
+    text = unpacked(report)['processors.txt']
     assert text.startswith(f'station {said[1].src}: SLC 5/04 series B revision 3, RUN; status ')
     assert 'station 9' not in text  # it has refused the question
     assert main([str(path), '--summary', '--report', str(report), '--anonymous']) == 0
-    with ZipFile(report) as bundle:
-        assert 'status ' not in bundle.read('processors.txt').decode()
+    assert 'status ' not in unpacked(report)['processors.txt']
     monkeypatch.setattr(sniff_report, 'MOST_ENTRIES', 1)
     assert main([str(path), '--summary', '--report', str(report)]) == 0
-    with ZipFile(report) as bundle:
-        assert bundle.read('processors.txt').decode() == text
-        assert len(bundle.read('entries.txt').splitlines()) == 1
+    files = unpacked(report)
+    assert files['processors.txt'] == text
+    assert len(files['entries.txt'].splitlines()) == 1
     capsys.readouterr()
 
 
@@ -229,13 +231,14 @@ def test_files_of_one_name_are_all_in_the_bundle(tmp_path: Path, capture: str) -
         (tmp_path / folder).mkdir()
         names.append(str(tmp_path / folder / 'net.csv'))
         Path(names[-1]).write_text(f'Station\n{len(names)}\n', encoding='utf-8')
-    report, other = str(tmp_path / 'report.zip'), tmp_path / 'one' / 'line.cap'
+    report, other = tmp_path / 'report.zip', tmp_path / 'one' / 'line.cap'
     other.write_text('1.0 > 10 05\n', encoding='ascii')
-    assert main([capture, str(other), '--summary', '--report', report, '--settings', *names]) == 0
-    with ZipFile(report) as bundle:
-        assert bundle.read('capture/1_line.cap') == other.read_bytes()
-        assert [bundle.read(f'settings/{name}')[:9] for name in (
-            'net.csv', '1_net.csv', '2_net.csv')] == [b'Station\n1', b'Station\n2', b'Station\n3']
+    assert main([capture, str(other), '--summary', '--report', str(report),
+                 '--settings', *names]) == 0
+    files = unpacked(report)
+    assert files['capture/1_line.cap'] == '1.0 > 10 05\n'
+    assert [files[f'settings/{name}'][:9] for name in ('net.csv', '1_net.csv', '2_net.csv')] == [
+        'Station\n1', 'Station\n2', 'Station\n3']
 
 
 @pytest.mark.parametrize('args', [

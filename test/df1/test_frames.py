@@ -43,7 +43,7 @@ from abdf1_ros.df1.packet import begins_good_reply, Packet
 from abdf1_ros.errors import FormatError
 import pytest
 from support.cases import for_all
-from support.vectors import CAPTURED, Captured, MESSAGES, Vector, vector, VECTORS
+from support.vectors import CAPTURED, Captured, MESSAGES, Vector, VECTORS
 
 HALF, FULL, CRC, BCC = Duplex.HALF, Duplex.FULL, Checksum.CRC, Checksum.BCC
 DATA = bytes.fromhex('01 00 0F 00 01 06 A2 02 07 89 00 00')
@@ -176,12 +176,6 @@ def test_poll_of_a_master_that_does_not_double_station_10(chunk: int | None) -> 
 @for_all('start', [b'\x10\x05', b'\x10\x01', b'\x10\x01\x07', b'\x10\x01\x07\x55'])
 def test_symbol_breaks_into_a_multidrop_header(start: bytes) -> None:
     assert decode(start + ACK, chunk=1) == [Control(Code.ACK)]
-
-
-def test_etx_pair_among_the_check_bytes_is_check() -> None:
-    (frame, ack) = decode(vector('crc_low_equals_DLE').frame + ACK, CRC, FULL, 1)
-    assert isinstance(frame, Frame) and frame.fault is None
-    assert ack == Control(Code.ACK)
 
 
 @for_all('size', [0, 1, 5])

@@ -19,7 +19,6 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Code, Control, Duplex, Frame, FrameFault, Poll, Symbol
 from abdf1_ros.df1.listener import LineKind, ListeningDecoder
 from abdf1_ros.df1.packet import Packet
-from hypothesis import given, strategies
 import pytest
 from support.cases import for_all
 from support.vectors import MESSAGES, Vector
@@ -155,25 +154,6 @@ def test_damaged_frames_change_no_guess() -> None:
     for _ in range(3):  # twice in a row may be chance, however often
         symbols(decoder, frame(Checksum.CRC) + 2 * (frame(Checksum.BCC) + frames.ACK))
         assert kind.checksum is Checksum.CRC
-
-
-PIECES = strategies.sampled_from([
-    frames.ACK, frames.NAK, frames.EOT, frames.ENQ, frames.STX, frames.SOH, frames.ETX,
-    b'\x10\x10', b'\x10', b'\x01', b'\x02\x03', frame(Checksum.CRC), frame(Checksum.BCC, 0x1010),
-    frames.master_frame(16, COMMAND, Checksum.CRC), frames.poll_frame(16)])
-
-
-@given(strategies.lists(PIECES, max_size=12), strategies.integers(1, 40))
-def test_what_stood_on_the_line_is_kept_for_each_symbol(pieces: list[bytes], size: int) -> None:
-    data = b''.join(pieces)
-    decoder = ListeningDecoder(LineKind())
-    kept = []
-    for start in range(0, len(data), size):
-        decoder.feed(data[start:start + size])
-        while decoder.next_symbol() is not None:
-            kept.append(decoder.wire)
-    assert all(wire[:1] == frames.DLE and len(wire) > 1 for wire in kept)
-    assert sum(map(len, kept)) <= len(data)
 
 
 def test_a_response_inside_a_message_is_kept_apart_from_it() -> None:

@@ -129,16 +129,6 @@ def test_response_proves_nothing_while_bytes_have_still_to_leave() -> None:
         assert bench.machine.deadline == pytest.approx(free + 1.0)
 
 
-def test_symbol_ends_a_step() -> None:
-    bench = Bench(Send(FRAME, 1.0), Send(FRAME, 1.0))
-    bench.machine.receive_data(ACK[:1], 0.45)
-    assert bench.got == []
-    bench.machine.receive_data(ACK[1:], 0.5)
-    assert bench.got == [SAID_ACK]
-    assert bench.machine.deadline == 1.5
-    assert bench.machine.now == 0.5
-
-
 def test_timeout_ends_a_step_at_its_deadline_and_not_before() -> None:
     bench = Bench(Send(FRAME, 1.0), Listen(1.0))
     bench.machine.handle_timeout(0.999)
@@ -146,13 +136,6 @@ def test_timeout_ends_a_step_at_its_deadline_and_not_before() -> None:
     bench.machine.handle_timeout(1.0)
     assert bench.got == [None]
     assert bench.machine.deadline == 2.0
-
-
-def test_timeout_zero_does_not_wait() -> None:
-    bench = Bench(Send(ACK), Send(EOT), Send(FRAME, 1.0))
-    assert bench.machine.data_to_send() == ACK + EOT + FRAME
-    assert bench.got == [None, None]
-    assert bench.machine.deadline == 1.0
 
 
 def test_frame_that_nothing_is_waited_for_is_sent_before_the_procedure_goes_on() -> None:
