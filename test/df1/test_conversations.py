@@ -12,7 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Every rule of vectors/conversations.json, played with a link of its mode."""
+"""Every rule of vectors/conversations.json, played with a link of its mode, and single faults."""
+
+from random import Random
+import secrets
 
 from abdf1_ros.df1 import radio
 import pytest
@@ -25,6 +28,7 @@ from support.conversations import (
     played,
     Player,
 )
+from support.single_faults import CHECKS, Fault, KINDS, MODES, Tally
 
 
 @for_all('conversation', CONVERSATIONS)
@@ -75,3 +79,30 @@ def test_gateway_and_the_station_behind_it_are_two() -> None:
     stations = played('master_gateway_status').stations
     assert stations[17].last_heard is not None
     assert stations[99].last_heard is None
+
+
+# Faults of one byte, or of two, in every mode, check and kind of transaction: a sample
+
+
+# Of each kind of transaction; idle polls make a case of these modes many times as long.
+CASES = dict.fromkeys(MODES, 5) | {'Standard': 1, 'Slave': 1}
+
+
+@pytest.mark.parametrize('mode', MODES)
+def test_no_fault_of_one_or_two_bytes_does_harm(mode: str) -> None:
+    seed = secrets.randbelow(1 << 31)
+    random = Random(seed)
+    for kind in KINDS:
+        tally = Tally(mode, random.choice(CHECKS), kind)
+        count = max(1, CASES[mode] // (5 if kind == 'two packets' else 1))
+        for fault in random.sample(tally.all_singles(), count):
+            tally.carry_out(fault)
+        for _ in range(count):
+            tally.carry_out(*tally.pair(random))
+        assert not tally.wrong, f'seed {seed}, {tally}'
+
+
+def test_slave_that_executes_repetitions_is_found() -> None:
+    tally = Tally('Master', 'CRC', 'write', detects_duplicates=False)
+    tally.carry_out(Fault(0, 0, 'lost'))  # of the ACK
+    assert [why.split(': ')[-1] for why in tally.wrong] == ['Outcome.WRITTEN, executed 2 times']
