@@ -12,20 +12,26 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The data table of an emulated PLC, and places that have words in common."""
-
+"""The data table of an emulated PLC, places that share words, and every dialect against it."""
 
 from abdf1_ros.df1.packet import BROADCAST
+from abdf1_ros.errors import FormatError
+from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile, OutOfRange
+from abdf1_ros.pccc.dialect import Dialect, Transfer
 from abdf1_ros.pccc.extent import Extent
-from abdf1_ros.pccc.families import parse_address
+from abdf1_ros.pccc.families import dialect_of, FAMILIES, parse_address
 from abdf1_ros.pccc.file_types import FileType, PlcType
+from abdf1_ros.pccc.processor import Processor
+from hypothesis import given, settings
+from hypothesis import strategies as st
 import pytest
 from support.cases import for_all
 from support.mappings import make_mapping
+from support.tables import replied
 
-SLC, PLC5 = PlcType.SLC, PlcType.PLC5
+SLC = PlcType.SLC
 
 
 def at(text: str, family: PlcType = SLC) -> Address:
@@ -111,3 +117,125 @@ def test_words_of_a_broadcast_meet_those_of_every_station_from_either_side() -> 
     for one, other in ((BROADCAST, 2), (2, BROADCAST)):
         assert Extent(one, area, 0, 2).meets(Extent(other, area, 1, 3))
         assert not Extent(one, area, 0, 2).meets(Extent(other, area, 2, 3))
+
+
+# Every dialect against the emulated PLC that it is for
+
+
+# Every family and access that the emulated PLC serves, with places of each kind of file. The
+# common interface file is one of an SLC, whose words a PLC-2 address names by their number.
+PLACES = {
+    (PlcType.PLC2, Access.UNPROTECTED): ['000', '020', '77700'],
+    (PlcType.PLC2, Access.PROTECTED): ['020'],
+    (PlcType.PLC3, Access.WORD_RANGE): [
+        'N7:3', 'B300:9000', 'I:017', 'O3:0', 'T:2.PRE', 'C:9.ACC', 'D1:0', 'A1:0', 'S:5'],
+    (PlcType.PLC5, Access.TYPED): [
+        'N7:3', 'B300:900', 'T4:3.PRE', 'C5:3.ACC', 'S:3', 'I:017', 'A9:1'],
+    (PlcType.PLC5, Access.WORD_RANGE): [
+        'N7:3', 'B300:900', 'T4:3.PRE', 'C5:3.ACC', 'S:3', 'I:017', 'A9:1'],
+    (PlcType.SLC, Access.SLOT): ['N7:3', 'B3:250', 'T4:3.PRE', 'C5:3.ACC', 'S:3', 'O:2.1'],
+}
+WORDS = [(*key, text) for key, texts in PLACES.items() for text in texts]
+FLOATS = [(PlcType.PLC5, Access.TYPED), (PlcType.PLC5, Access.WORD_RANGE),
+          (PlcType.SLC, Access.SLOT)]
+
+
+def bench(family: PlcType, access: Access, text: str,
+          words: int = 300) -> tuple[Address, Dialect, DataTable]:
+    """Return a place, how to get there, and a table that has words from there on."""
+    address = parse_address(text, family)
+    table = DataTable(family)
+    table.create(address, words)
+    return address, dialect_of(family, access), table
+
+
+@for_all('family', FAMILIES)
+def test_every_family_has_a_dialect_for_every_access_it_serves(family: PlcType) -> None:
+    assert dialect_of(family) is dialect_of(family, FAMILIES[family].accesses[0])
+
+
+@for_all(('family', 'access', 'right'), [
+    (PlcType.PLC5, Access.SLOT, 'PLC-5 is Typed, WordRange, not Slot'),
+    (PlcType.PLC3, Access.TYPED, 'PLC-3 is WordRange, not Typed'),
+    (PlcType.PLC2, Access.FLAT, 'PLC-2 is Unprotected, Protected, CIF, not Flat'),
+    (PlcType.SLC, Access.CIF, 'SLC is Slot, Flat, not CIF')])
+def test_access_of_another_family(family: PlcType, access: Access, right: str) -> None:
+    with pytest.raises(FormatError, match=f'^Access of a {right}$'):
+        dialect_of(family, access)
+
+
+@settings(max_examples=40)
+@given(st.sampled_from(WORDS), st.integers(0, 0xFFFF), st.integers(0, 0xFFFF),
+       st.integers(0, 0xFFFF))
+def test_write_read_and_write_bits_come_back(place: tuple[PlcType, Access, str], value: int,
+                                             mask: int, bits: int) -> None:
+    address, dialect, table = bench(*place, words=5)
+    before = address.at_offset(max(0, address.offset - 1))
+    assert replied(table, *dialect.write(address, value.to_bytes(2, 'little'))) == b''
+    if mask:
+        assert replied(table, *dialect.write_bits(address, mask, bits)) == b''
+    data = dialect.read_data(address, 1, replied(table, *dialect.read(address, 1)))
+    assert int.from_bytes(data, 'little') == value & ~mask | bits & mask
+    assert before == address or not any(table.read(before, 1))
+    assert not any(table.read(address.at_offset(address.offset + 1), 4))
+
+
+@for_all('place', [place for place in WORDS if '.' not in place[2]])
+def test_largest_packets_are_served(place: tuple[PlcType, Access, str]) -> None:
+    address, dialect, table = bench(*place, words=150)
+    words = dialect.max_write(address.file_type)
+    data = bytes(n % 251 + 1 for n in range(2 * words))
+    assert replied(table, *dialect.write(address, data)) == b''
+    assert table.read(address, words) == data
+    words = dialect.max_read(address.file_type)
+    reply = replied(table, *dialect.read(address, words))
+    assert len(reply) == dialect.reply_size(address, words)
+    assert dialect.read_data(address, words, reply) == table.read(address, words)
+
+
+@for_all('place', FLOATS)
+def test_every_value_of_every_file_type_goes_there_and_back(place: tuple[PlcType, Access]) -> None:
+    family, dialect = place[0], dialect_of(*place)
+    for kind in FAMILIES[family].file_types:
+        file = kind.default_file if kind.default_file is not None else 9
+        layout = FAMILIES[family].layout(kind)
+        start = Address(FAMILIES[family].addressing, kind, file, 1)
+        table = DataTable(family)
+        table.create(start, 2 * layout.words)
+        stored = bytearray(4 * layout.words)
+        for word in filter(layout.value_words, range(layout.words) if kind.is_structure else (0,)):
+            address = start.at_offset(start.offset + word)
+            words = layout.value_words(word) if kind.is_structure else layout.words
+            data = bytes(range(word + 1, word + 1 + 2 * words))
+            assert replied(table, *dialect.write(address, data)) == b''
+            reply = replied(table, *dialect.read(address, words))
+            assert len(reply) == dialect.reply_size(address, words)
+            assert dialect.read_data(address, words, reply) == data
+            stored[2 * word:2 * (word + words)] = data
+        assert table.read(start, 2 * layout.words) == stored
+        reply = replied(table, *dialect.read(start, layout.words))
+        assert dialect.read_data(start, layout.words, reply) == stored[:2 * layout.words]
+
+
+def test_processor_is_for_an_slc_only() -> None:
+    with pytest.raises(FormatError, match='^a PLC-5 has no Processor$'):
+        dialect_of(PlcType.PLC5, None, Processor.SLC_5_03)
+
+
+@settings(max_examples=40)
+@given(st.sampled_from([place for place in WORDS if '.' not in place[2]]),
+       st.integers(1, 40), st.integers(1, 15))
+def test_parts_of_a_transfer_make_the_whole(place: tuple[PlcType, Access, str], words: int,
+                                            step: int) -> None:
+    address, dialect, table = bench(*place, words=40)
+    data = bytes(n % 251 + 1 for n in range(2 * words))
+    whole = Transfer(address, words)
+    read = b''
+    for first in range(0, words, step):
+        count = min(step, words - first)
+        part = address.at_offset(address.offset + first)
+        packet = data[2 * first:2 * (first + count)]
+        assert replied(table, *dialect.write(part, packet, whole)) == b''
+        reply = replied(table, *dialect.read(part, count, whole))
+        read += dialect.read_data(part, count, reply)
+    assert table.read(address, words) == read == data
