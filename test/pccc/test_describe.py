@@ -148,7 +148,7 @@ def test_malformed_commands_are_given_as_bytes(data: str) -> None:
     assert text.endswith(f'): {data}')
 
 
-@for_all(('cmd', 'asked', 'data', 'text'), [*((0x0F, *case) for case in (
+READ_REPLIES = (  # the command's data, the reply's, and its words
     ('A2 04 07 89 00 00', '34 12 FE FF', '4660 -2'),
     ('A2 04 03 85 00 00', '34 12 FE FF', '1234 FFFE'),
     ('A2 04 08 8A 00 00', '00 00 AC 41', '21.5'),
@@ -160,8 +160,8 @@ def test_malformed_commands_are_given_as_bytes(data: str) -> None:
     ('68 00 00 01 00 07 00 08 00 01 00', '99 09 06 94 08 00 00 AC 41', '21.5'),
     ('68 00 00 01 00 07 00 07 00 01 00', '95 09', '95 09'),
     ('01 00 00 02 00 07 00 07 00 04', '34 12 FE FF', '1234 FFFE'),
-    ('00 00 00 01', '01 02', '01 02'), ('E7', '01 02', '01 02'))),
-    *((0x06, '03', *case) for case in (  # diagnostic status
+    ('00 00 00 01', '01 02', '01 02'), ('E7', '01 02', '01 02'))
+STATUS_REPLIES = (  # to diagnostic status
     ('00 EE 34 49 22 35 2F 30 33 20 20 20 20 20 20 20 00 00 06 00 00 00 10 00',
      'SLC 5/03 series B revision 3, REM RUN'),
     ('40 EE 34 95 22 35 2F 30 39 20 20 20 20 20 20 20 16 01 01 20 00 00 10 00',
@@ -170,7 +170,11 @@ def test_malformed_commands_are_given_as_bytes(data: str) -> None:
      'SLC 5/03 series B revision 3, REM RUN; name LINE 4'),
     ('08 BB 00 80 01 00 42 07 FD 00 0C 00 05 00 00 00 00',
      'PLC-5/15 series C revision C, PROG; major processor fault (word S:11 says which)'),
-    ('00 99 01 02 03 04 05 06 07 08', '00 99 01 02 03 04 05 06 07 08'), ('00', '00')))])
+    ('00 99 01 02 03 04 05 06 07 08', '00 99 01 02 03 04 05 06 07 08'), ('00', '00'))
+
+
+@for_all(('cmd', 'asked', 'data', 'text'), [
+    *((0x0F, *case) for case in READ_REPLIES), *((0x06, '03', *case) for case in STATUS_REPLIES)])
 def test_reply_is_described_by_what_was_asked(cmd: int, asked: str, data: str, text: str) -> None:
     request = command(asked, cmd)
     assert describe(request.reply(bytes.fromhex(data)), request) == text
