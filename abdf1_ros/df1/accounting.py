@@ -24,7 +24,7 @@ from abdf1_ros.df1.frames import Control, Frame, FrameFault, MAX_LINK_DATA, Symb
 from abdf1_ros.df1.packet import DIAGNOSTIC_REPLY, HEADER_SIZE, is_local_status, Packet, REPLY_BIT
 from abdf1_ros.df1.stations import ActiveStationList, MOST_OVERDUE
 from abdf1_ros.df1.tasks import Task
-from abdf1_ros.errors import CommandTimeout, WrongCommandCode
+from abdf1_ros.errors import CommandExpired, CommandTimeout, WrongCommandCode
 from abdf1_ros.messages import Event, Message
 
 ReportEvent = Callable[[Event], None]
@@ -92,6 +92,12 @@ class Tally:
             self.counters.error_messages_sent += packet.sts != 0
         else:
             self.counters.commands_sent += 1
+
+    def taken_back(self, error: CommandExpired, *, was_sent: bool) -> None:
+        """Uncount a try that was too old to be sent; ``was_sent``: there was an earlier try."""
+        self.counters.messages_sent -= 1
+        self.counters.commands_sent -= not was_sent
+        error.sent = was_sent
 
     def received(self, packet: Packet) -> None:
         """Count a good message that is not a repetition."""

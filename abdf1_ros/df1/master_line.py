@@ -138,7 +138,11 @@ class MasterLine:
         if number == BROADCAST:
             self.counters.messages_sent += 1
             begun = self.machine.now
-            yield Send(frame, BROADCAST_PAUSE)
+            try:
+                yield Send(frame, BROADCAST_PAUSE, expires=expires)
+            except CommandExpired as error:
+                self.accounting.taken_back(error, was_sent=False)
+                raise
             return begun
         station = self.stations.records[packet.dst]
         gateway = self.stations.records[number]
@@ -153,8 +157,7 @@ class MasterLine:
                     Send(frame, timeout, expires=expires, reflex=reflex), number,
                     _MESSAGE_ANSWERS)
             except CommandExpired as error:
-                self.counters.messages_sent -= 1
-                error.sent = retry > 1
+                self.accounting.taken_back(error, was_sent=retry > 1)
                 raise
             if answer is Control.ACK:
                 self.stations.heard(number, self.machine.now)

@@ -334,8 +334,13 @@ class StandardPollingMaster:
         number = self._stations.via(station)
         if number == BROADCAST:
             task.sent = True
-            yield from self._line.deliver(number, task.command)
-            task.reply(task.command.reply())
+            try:
+                yield from self._line.deliver(number, task.command, task.expires)
+            except CommandExpired as error:
+                task.sent = error.sent
+                task.fail(error)
+            else:
+                task.reply(task.command.reply())
             return True
         was_silent = not self._stations[number].active
         if was_silent and not task.is_own:

@@ -227,7 +227,7 @@ class RadioNode(EqualNode):
         try:
             yield from self._send(task.command.encode(), command)
         except CommandExpired as error:
-            task.sent = error.sent = command.tries > 0
+            task.sent = error.sent
             del self._under_way[number]
             task.fail(error)
             return
@@ -250,8 +250,8 @@ class RadioNode(EqualNode):
         self._sent.append(data)
         try:
             symbol = yield Send(frame, MOMENT, expires=expires)
-        except CommandExpired:
-            self._counters.messages_sent -= 1
+        except CommandExpired as error:
+            self._accounting.taken_back(error, was_sent=command is not None and command.tries > 0)
             raise
         self._hear(symbol)
         # We send nothing more before this frame has left.

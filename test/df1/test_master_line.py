@@ -18,10 +18,10 @@ from dataclasses import replace
 import itertools
 
 from abdf1_ros.df1.master_line import MAX_FORWARDS
-from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.settings import LinkSettings, PollingSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave
-from abdf1_ros.errors import StationInactive
+from abdf1_ros.errors import CommandExpired, StationInactive
 import pytest
 from support.cases import long_unless
 from support.multidrop import MasterBench, Slave
@@ -32,11 +32,12 @@ BOTH = pytest.mark.parametrize('standard', [False, True], ids=['message', 'stand
 
 
 def bench(standard: bool, *numbers: int, dead: tuple[int, ...] = (),
-          settings: LinkSettings = SETTINGS, serves: bool = True, retries: int = 3) -> MasterBench:
+          settings: LinkSettings = SETTINGS, serves: bool = True, retries: int = 3,
+          tx_delay: float = 0.0) -> MasterBench:
     """Return a master of either kind and its stations."""
     polling = PollingSettings(numbers) if standard else None
-    return MasterBench(*numbers, settings=settings, polling=polling, dead=dead,
-                       serve=Packet.reply if serves else None, retries=retries)
+    return MasterBench(*numbers, settings=settings, polling=polling, dead=dead, retries=retries,
+                       serve=Packet.reply if serves else None, tx_delay=tx_delay)
 
 
 def poll(rig: MasterBench, *numbers: int, times: int = 1) -> None:
@@ -265,3 +266,19 @@ def test_slaves_that_never_stop_talking_leave_the_master_its_turns(
     assert rig.master.changes == []
     assert {number for number, *_ in rig.master.numbers()} == {2523}
     assert all(len(rig[number].served) > 50 for number in numbers)
+
+
+@BOTH
+@pytest.mark.parametrize('dst', [7, BROADCAST])
+def test_command_that_became_too_old_in_its_tx_delay_is_not_sent_and_not_counted(
+        standard: bool, dst: int) -> None:
+    rig = bench(standard, 7, tx_delay=0.3)
+    rig.start(run=2.0)
+    task = rig.master.add(Packet(dst, MASTER, 0x0F, 0, 9, b'\x68'))
+    task.expires = rig.clock() + 0.1
+    rig.line.wake(rig.master.machine)
+    rig.run(3.0)
+    assert isinstance(task.result, CommandExpired) and not task.result.sent
+    assert (task.sent, f'C{dst}' in rig.master.said) == (False, False)
+    counters = rig.master.machine.counters
+    assert (counters.commands_sent, counters.messages_sent) == (0, 0)

@@ -155,6 +155,7 @@ def test_command_that_has_become_too_old_is_not_repeated() -> None:
         bench.machine.wake(bench.now)
         assert bench.wait(30.0) == []
         assert isinstance(old.result, CommandExpired) and not (old.result.sent or old.sent)
+    assert bench.machine.counters.commands_sent == bench.machine.counters.messages_sent == 1
 
 
 def test_repetition_is_known_whatever_many_others_have_sent_since() -> None:
