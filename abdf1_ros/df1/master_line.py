@@ -151,7 +151,8 @@ class MasterLine:
         timeout = self._timeout if station.active else min(self._timeout, answer_within)
         for retry in range(1, self.settings.nak_retries + 2):
             self.counters.messages_sent += 1
-            begun = self.machine.now
+            begun = max(self.machine.now, self.machine.sender.free_at) \
+                + self.machine.timing.tx_delay
             try:
                 answer = yield from self._ask(
                     Send(frame, timeout, expires=expires, reflex=reflex), number,

@@ -282,3 +282,11 @@ def test_command_that_became_too_old_in_its_tx_delay_is_not_sent_and_not_counted
     assert (task.sent, f'C{dst}' in rig.master.said) == (False, False)
     counters = rig.master.machine.counters
     assert (counters.commands_sent, counters.messages_sent) == (0, 0)
+
+
+@BOTH
+def test_cmd_timeout_begins_when_the_command_goes_out_after_its_tx_delay(standard: bool) -> None:
+    rig = bench(standard, 7, settings=replace(SETTINGS, cmd_timeout=1.0), tx_delay=0.5)
+    rig[7].delay = 0.6
+    rig.start()
+    assert isinstance(rig.ask(7, run=6.0).result, Packet)
