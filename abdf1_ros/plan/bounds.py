@@ -125,7 +125,7 @@ class Times:
     """
     The times that heartbeats and fallbacks of a line can keep.
 
-    - ``blocks``: the blocks that are read.
+    - ``blocks``: the blocks that are read again and again; reads on demand are in ``mappings``.
     - ``response_time``: usual seconds of a station for an answer.
     - ``longest``: T (s).
     """
@@ -138,7 +138,8 @@ class Times:
         self._response_time = response_time
         self._mode, self._line = network.line_mode, network.line
         model = forecast.line_model(network)
-        reads = [forecast.longest_wait([block], 0.0) for block in blocks]
+        on_demand = map(Planner(model, default_period=0.0).alone, mappings.on_demand)
+        reads = [time for block in (*blocks, *on_demand) for time in block.line_times]
         self._written = {mapping: _packets(model, mapping) for mapping in mappings.written}
         # The command of a guest that is under way may be the longest that exists.
         guest = model.transaction_time(MAX_LINK_DATA, MAX_LINK_DATA) if network.share else 0.0
@@ -276,10 +277,10 @@ class Times:
                    default=0.0)
 
 
-def remarks(network: Network, mappings: Rows,
+def remarks(network: Network, mappings: Rows, blocks: Sequence[Block],
             response_time: float = forecast.USUAL_RESPONSE_TIME) -> Iterator[str]:
     """Yield remarks on the times of heartbeats and fallbacks (rules 2 and 16)."""
-    times = Times(network, mappings, (), response_time)
+    times = Times(network, mappings, blocks, response_time)
     longest, end = times.longest, times.end or 0.0
     if end > LONGEST_END:
         yield (f'an orderly end needs {milliseconds(end)} and has {milliseconds(LONGEST_END)}: '

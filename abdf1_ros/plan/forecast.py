@@ -104,8 +104,8 @@ def intervals(blocks: Iterable[Block], own: Iterable[tuple[float, float]] = (),
 
 def longest_wait(blocks: Iterable[Block], response_time: float = USUAL_RESPONSE_TIME) -> float:
     """Return the seconds that the longest single transaction takes."""
-    return max((block_time(block, response_time) / len(block.requests) for block in blocks),
-               default=0.0)
+    return max((time for block in blocks for time in block.line_times), default=0.0) \
+        + ANSWERS * response_time
 
 
 def stale_times(blocks: Iterable[Block], default_period: float, stale_after: float,

@@ -50,7 +50,7 @@ class Block:
     A block that is read together: one request, or several for one mapping longer than a packet.
 
     It has the words of all ``mappings``. ``period`` is the shortest of their periods, in seconds.
-    ``line_time`` is the seconds that its transactions take on the line when the station answers
+    ``line_times`` is the seconds that each transaction takes on the line when the station answers
     at once.
     """
 
@@ -58,7 +58,12 @@ class Block:
     requests: tuple[Transfer, ...]
     mappings: tuple[Mapping, ...]
     period: float
-    line_time: float
+    line_times: tuple[float, ...]
+
+    @property
+    def line_time(self) -> float:
+        """Return the seconds that all its transactions take."""
+        return sum(self.line_times)
 
     @property
     def dialect(self) -> Dialect:
@@ -237,10 +242,10 @@ class Planner:
         requests = tuple(
             Transfer(first.address.at_offset(at), min(limit, span.end - at))
             for at in range(span.first, span.end, limit))
-        line_time = sum(self.line_model.read_time(first.dialect, request, first.station)
-                        for request in requests)
+        line_times = tuple(self.line_model.read_time(first.dialect, request, first.station)
+                           for request in requests)
         period = min(map(self._period, mappings))
-        return Block(first.station, requests, tuple(mappings), period, line_time)
+        return Block(first.station, requests, tuple(mappings), period, line_times)
 
 
 @lru_cache(maxsize=256)

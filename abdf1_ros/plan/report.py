@@ -192,7 +192,7 @@ class Report:
         if not self.mappings:
             text = 'the map has no usable row: nothing is read or written'
             return [*found, Remark(RemarkKind.MAP, text)]
-        times = bounds.remarks(self.network, self.mappings, self.response_time)
+        times = bounds.remarks(self.network, self.mappings, self.blocks, self.response_time)
         if self.network.line_mode.only_listens:
             return found
         return [*found, *self.load_remarks(), *_gap_remarks(self), *_again_remarks(self),
@@ -458,9 +458,9 @@ def _time_side_by_side(report: Report, blocks: Sequence[Block]) -> float:
     packets = [limit] * (needed // limit) + [needed % limit] * (needed % limit > 0)
     requests = tuple(Transfer(example.start, words) for words in packets)
     model = forecast.line_model(report.network)
-    line_time = sum(model.read_time(example.dialect, request, example.station)
-                    for request in requests)
-    return report.time(replace(example, requests=requests, line_time=line_time))
+    line_times = tuple(model.read_time(example.dialect, request, example.station)
+                       for request in requests)
+    return report.time(replace(example, requests=requests, line_times=line_times))
 
 
 def _words(mappings: Iterable[Mapping]) -> set[int]:

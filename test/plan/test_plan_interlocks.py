@@ -108,6 +108,20 @@ def test_rule_16_bound_counts_all_that_may_go_before_a_fallback(others: int, rea
                           'where no frame gets lost')
 
 
+def test_rule_16_longest_packet_of_any_read_counts_also_of_one_on_demand() -> None:
+    """And the remarks on the times count the same transactions."""
+    slow = Network(baud=1200, timeout=300)
+    reports = [make_report(slow, Rows([speed(), make_mapping('N9:0', plc='SLC', length=length,
+                                                             is_on_demand=is_on_demand)]), 0.1)
+               for length, is_on_demand in ((118, False), (119, False), (118, True))]
+    assert len({report.times.longest for report in reports}) == 1
+    for report in reports:
+        end = report.times.end
+        assert end and end > 2.0
+        assert any(remark.text.startswith(f'an orderly end needs {milliseconds(end)}; ~/polling')
+                   for remark in report.remarks())
+
+
 def test_rule_16_standard_polling_adds_its_scans_and_slave_has_no_bound() -> None:
     rows = [speed(), *(make_mapping('N7:9', station=station) for station in range(2, 12))]
     message, = Times(QUICK, Rows(rows)).bounds()
@@ -209,12 +223,12 @@ def test_rule_16_conditions_of_bounds_by_radio_are_told(forwards: str, count: in
 
 def test_rule_16_period_shorter_than_a_scan_is_warned_of() -> None:
     rows = [beat(150), beat(200, 'slow'), make_mapping('N7:0', period=100)]
-    (text,) = [text for text in remarks(QUICK, Rows(rows)) if 'shorter than a scan' in text]
+    (text,) = [text for text in remarks(QUICK, Rows(rows), ()) if 'shorter than a scan' in text]
     assert text.startswith('beat: a Period of 150 ms')
 
 
 def test_rule_16_transactions_longer_than_period_or_fallback_after_are_warned_of() -> None:
-    of_beat, of_speed = remarks(Network(), Rows([beat(), speed()]))
+    of_beat, of_speed = remarks(Network(), Rows([beat(), speed()]), ())
     assert 'one transaction may take 8380 ms' in of_beat
     assert 'its Period is 1000 ms' in of_beat
     assert 'Fallback_After 3000 ms is shorter than two transactions' in of_speed
@@ -287,10 +301,11 @@ def test_rules_5_and_16_end_where_no_plc_answers_has_the_time_that_is_printed(
 
 
 def test_rule_5_end_that_is_too_long_where_no_plc_answers_is_warned_of() -> None:
-    many = [warning for warning in remarks(replace(QUICK, mode='Radio'), Rows(plant(2, 5)))
+    many = [warning for warning in remarks(replace(QUICK, mode='Radio'), Rows(plant(2, 5)), ())
             if 'where no PLC answers' in warning]
     assert ['does not try the last rows' in warning for warning in many] == [True]
-    assert not [warning for warning in remarks(QUICK, Rows(plant(2, 5))) if 'answers' in warning]
+    assert not [warning for warning in remarks(QUICK, Rows(plant(2, 5)), ())
+                if 'answers' in warning]
 
 
 @pytest.mark.parametrize(('stations', 'rows', 'text'), [
@@ -299,7 +314,7 @@ def test_rule_5_end_that_is_too_long_where_no_plc_answers_is_warned_of() -> None
 def test_rule_5_end_that_takes_longer_than_it_has_is_warned_of(
         stations: int, rows: int, text: str) -> None:
     network = replace(QUICK, baud=9600)
-    found = [warning for warning in remarks(network, Rows(plant(stations, rows)))
+    found = [warning for warning in remarks(network, Rows(plant(stations, rows)), ())
              if 'orderly end' in warning]
     assert [text in warning for warning in found] == ([True] if text else [])
 
@@ -311,7 +326,7 @@ def test_rule_5_mode_slave_has_no_time_for_an_end() -> None:
 
 
 def test_rule_16_rows_that_are_fast_enough_are_not_warned_of() -> None:
-    assert list(remarks(QUICK, Rows([beat(2000), speed()]))) == []
+    assert list(remarks(QUICK, Rows([beat(2000), speed()]), ())) == []
 
 
 def test_rule_14_timeout_is_three_planned_intervals() -> None:
@@ -369,5 +384,5 @@ def test_newest_state_that_may_be_too_old_on_a_full_line_is_named(
     map_rows = Rows([make_mapping(
         f'N7:{number}', command, tag=f'w{number}', fallback=after and Fallback((0,), after))
         for number in range(rows)])
-    texts = [text for text in remarks(QUICK, map_rows) if 'newest value may be older' in text]
+    texts = [text for text in remarks(QUICK, map_rows, ()) if 'newest value may be older' in text]
     assert [text.partition(':')[0] for text in texts] == ['w0'] * is_late
