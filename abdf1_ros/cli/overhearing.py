@@ -16,7 +16,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 import re
@@ -95,25 +96,37 @@ class Overhearing:
 
 
 def overheard(network: Network, rows: Rows,
-              files: Iterable[str]) -> tuple[list[str], dict[Mapping, str]]:
+              files: Sequence[str]) -> tuple[list[str], dict[Mapping, str]]:
     """
     Return the reads in recordings as text, and the rows that stay empty, with the reason.
 
     Raises OSError, and Problem if a file is damaged.
     """
-    chunks = [chunk for file in files for chunk in Recording(Path(file)).chunks()]
+    heard = [_recording(network, rows, Path(file)) for file in files]
+    unread = [each.unread() for each in heard]
+    return texts_of(read for each in heard for read in each.carried), {
+        row: max((reasons[row] for reasons in unread), key=len)  # the longer one names a read
+        for row in unread[0] if all(row in reasons for reasons in unread)}
+
+
+def _recording(network: Network, rows: Rows, file: Path) -> Overhearing:
+    """Return a driver of its own: neither bytes nor times continue those of another recording."""
+    chunks = [*Recording(file).chunks()]
     has_two = any(chunk.direction is Direction.IN for chunk in chunks)
     heard = Overhearing(replace(
         network, mode='Listen', listen_port=_SECOND if has_two else ''), rows)
     for chunk in chunks:
         heard.hear(chunk)
-    return texts_of(heard.carried), heard.unread()
+    return heard
 
 
 def texts_of(carried: Iterable[Carried]) -> list[str]:
-    """Return a line of text for each read."""
-    return [f'station {read.station}: {read.text}: {counted(read.count, "time")}'
-            for read in carried]
+    """Return a line of text for each read; the counts of equal reads are added."""
+    counts: Counter[tuple[int, str]] = Counter()
+    for read in carried:
+        counts[read.station, read.text] += read.count
+    return [f'station {station}: {text}: {counted(count, "time")}'
+            for (station, text), count in sorted(counts.items())]
 
 
 def map_of(carried: Iterable[Carried]) -> str:

@@ -400,8 +400,11 @@ def test_rows_that_a_recording_fills_are_told(tmp_path: Path, capsys: Output) ->
     at_once.write_text(re.sub(r'(\S+) < ((?:\S\S ){4})(.+)\n(\S+) (> .+)\n',
                               r'\1 < \2\n\4 \5\n\4 < \3\n', said), 'ascii')
     dump.write_text(re.sub(r'(?m)^\S+ [<>] ', '', said.partition('\n')[2]), 'ascii')
-    for heard in (half, at_once, dump, full):
-        assert main([str(net), str(rows), '--heard', str(heard)]) == 0
+    damaged = tmp_path / 'damaged_later.cap'
+    damaged.write_text('# abdf1_ros capture 1\n600.0 > 10 02 02 00 0F 10 03 00 00\n', 'ascii')
+    for recordings in ((half,), (at_once,), (dump,), (full,), (damaged, half), (full, half)):
+        heard = [word for path in recordings for word in ('--heard', str(path))]
+        assert main([str(net), str(rows), *heard]) == 0
         said = capsys.readouterr().out
         assert '/dev/ttyS0 and /dev/ttyS1: Mode Listen, ' in said
         assert 'warning: unread is not filled: no other node reads it' in said
@@ -410,7 +413,7 @@ def test_rows_that_a_recording_fills_are_told(tmp_path: Path, capsys: Output) ->
         assert 'warning: read is' not in said
         assert 'the recording fills 1 of 3 rows; it has:' in said
         assert 'station 2: word range read N7:7, 3 words: ' in said
-    assert main([str(net), str(rows), '--json', '--heard', str(heard)]) == 0
+    assert main([str(net), str(rows), '--json', *heard]) == 0
     content = json.loads(capsys.readouterr().out)['heard']
     assert content['rows']['read'] == '' and content['reads'] == sorted(content['reads'])
     assert content['rows']['unread'] == 'no other node reads it'
@@ -418,8 +421,8 @@ def test_rows_that_a_recording_fills_are_told(tmp_path: Path, capsys: Output) ->
     assert main([str(net), str(rows), '--heard', str(tmp_path / 'none.cap')]) == 2
     said = capsys.readouterr().out
     assert f'error: {tmp_path}/none.cap: No such file' in said and 'fills' not in said
-    assert main([str(rows), str(rows), '--heard', str(heard)]) == 2  # without a net file
+    assert main([str(rows), str(rows), *heard]) == 2  # without a net file
     net.write_text('Com_Port,Error_Code\n/dev/ttyS0,BCC\n', encoding='utf-8')
     rows.write_text(rows.read_text('utf-8').replace('unread,Read,', 'unread,ReadWrite,'), 'utf-8')
-    assert main([str(net), str(rows), '--heard', str(heard)]) == 0
+    assert main([str(net), str(rows), *heard]) == 0
     assert 'the recording fills 0 of 2 rows' in capsys.readouterr().out
