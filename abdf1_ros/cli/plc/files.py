@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
 
 from abdf1_ros.cli.plc.session import Session
@@ -27,6 +27,7 @@ from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.problems import Problem
+from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.rows import Rows
 from abdf1_ros.text import counted
 
@@ -38,7 +39,7 @@ USUAL_NUMBERS = tuple(range(32))
 
 
 def find_files(session: Session, station: int, plc_type: PlcType, processor: Processor | None,
-               numbers: Sequence[int] | None = None,
+               numbers: Collection[int] | None = None,
                show: Callable[[str], None] = lambda text: None,
                warn: Callable[[str], None] = lambda text: None) -> Iterator[DataFile]:
     """
@@ -77,19 +78,22 @@ def listed(session: Session, station: int, identity: Identity | None) -> list[Da
         return []
 
 
-def outside(found: Sequence[DataFile], mappings: Rows,
-            station: int) -> Iterator[Problem]:
-    """Yield a problem for each row of a map that lies outside the files of a station."""
+def in_files(mappings: Rows, station: int) -> list[Mapping]:
+    """Return the rows of a station whose addresses name a file by its number."""
+    return [mapping for mapping in mappings.of_plcs if mapping.station == station and not (
+        mapping.address.file_type.is_function or mapping.address.file_type.is_io)]
+
+
+def outside(found: Sequence[DataFile], mappings: Sequence[Mapping]) -> Iterator[Problem]:
+    """Yield a problem for each row that lies outside the files of its station."""
     files = {entry.number: entry for entry in found if not entry.type.is_function}
-    for mapping in mappings.of_plcs:
+    for mapping in mappings:
         address = mapping.address
-        if mapping.station != station or address.file_type.is_function or (
-                address.file_type.is_io):
-            continue
         entry, fault = files.get(address.file), ''
         if entry is None:
             fault = f'there is no file {address.file}'
-        elif entry.type is not address.file_type:
+        # A read does not show which of the types with one layout it is: N or B of a PLC-5.
+        elif address.addressing.files.get(entry.type) != address.layout:
             fault = f'file {address.file} is {entry}'
         elif mapping.extent.end > entry.elements * address.layout.words:
             fault = f'{entry} has only {counted(entry.elements, "element")}'

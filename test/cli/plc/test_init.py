@@ -47,7 +47,7 @@ from support.ptys import no_file_longer_than
 PATIENT = ('--timeout', '2000', '--duplex', 'half')  # ms; a busy host may be late
 
 PLC5 = (('O:000', 2), ('S:0', 32), ('B3:0', 5), ('T4:0', 30), ('N7:0', 256), ('F8:0', 20),
-        ('ST9:0', 84), ('A12:0', 7), ('D13:0', 2000), ('C20:0', 3))
+        ('ST9:0', 84), ('A12:0', 7), ('D13:0', 2000), ('C20:0', 3), ('B40:0', 3))
 SLC = (('I:3.0', 2), ('S:0', 64), ('B3:0', 1), ('N7:0', 100), ('F10:0', 8), ('L40:0', 4))
 
 
@@ -193,7 +193,8 @@ def test_init_that_finds_nothing_leaves_no_folder(tmp_path: Path, capsys: Output
 
 
 @pytest.mark.parametrize(('station', 'found'), [
-    ('1', 'O0 by rack or slot, S2 32, B3 5, T4 10, N7 256, F8 10, ST9 2, A12 7, D13 2000, C20 1'),
+    ('1', 'O0 by rack or slot, S2 32, B3 5, T4 10, N7 256, F8 10, ST9 2, A12 7, D13 2000, C20 1, '
+     'N40 3'),
     ('2', 'I1 2 words, S2 64, B3 1, N7 100, F10 4, L40 2')])
 def test_files_are_found_with_type_and_length(
         port: str, station: str, found: str, capsys: Output) -> None:
@@ -245,6 +246,13 @@ def test_rows_of_a_map_that_lie_outside_of_the_files(
         f'{path}:3 (Address): N10:0, Length 1: file 10 is F10',
         f'{path}:4 (Address): B12:0, Length 1: there is no file 12',
         f'{path}:6 (Address): B3:1, Length 1: B3 has only 1 element']
+    path.write_text(header + 'a,Read,L40:1,2,SLC,\nb,Read,B40:0,1,PLC5,3\nc,Read,B12:0,1,PLC5,\n',
+                    encoding='utf-8')  # the list of neither PLC is read
+    for args, told in ((('2', '--plc-type', 'SLC'), 'all rows of station 2 lie inside\n'), (
+            ('1',), f'{path}:4 (Address): B12:0, Length 1: file 12 is A12\n'), (
+            ('1', '--files', '31-40'), 'all rows of station 1 in these files lie inside\n')):
+        assert main(['files', *args, *line]) == ('file 12' in told)
+        assert capsys.readouterr().out == told
 
 
 def test_directory_takes_few_reads(port: str, capsys: Output) -> None:

@@ -39,7 +39,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments."""
     add_station(parser)
     parser.add_argument('--files', metavar='LIST', type=_numbers,
-                        help='file numbers up to 254 (default: the list of the PLC, or 0-31)')
+                        help='file numbers up to 254 (default: the list of the PLC, or 0-31; with '
+                             '--map FILE the files of its rows)')
     add_plc_type(parser)
     parser.add_argument('--map', metavar='FILE', nargs='?', const='',
                         help='print rows for a new map CSV; with FILE, check that map CSV against '
@@ -53,9 +54,13 @@ def run(options: argparse.Namespace) -> int:
 
 def _files(options: argparse.Namespace, session: Session, mappings: Rows) -> int:
     family, processor = family_of(options, session)
+    numbers, rows = options.files, files.in_files(mappings, options.station)
+    if options.map:  # only these files are looked for, and only their rows are judged
+        rows = [row for row in rows if numbers is None or row.address.file in numbers]
+        numbers = sorted({row.address.file for row in rows})
     progress = Progress()
     found = []
-    for entry in files.find_files(session, options.station, family, processor, options.files,
+    for entry in files.find_files(session, options.station, family, processor, numbers,
                                   progress.show, complain):
         found.append(entry)
         if options.map is None:
@@ -63,8 +68,10 @@ def _files(options: argparse.Namespace, session: Session, mappings: Rows) -> int
             print(f'{str(entry):6} {_extent(entry)}', flush=True)
     progress.clear()
     if options.map:
-        faults = [*files.outside(found, mappings, options.station)]
-        print('\n'.join(map(str, faults)) or f'all rows of station {options.station} lie inside')
+        faults = [*files.outside(found, rows)]
+        which = '' if options.files is None else ' in these files'
+        print('\n'.join(map(str, faults))
+              or f'all rows of station {options.station}{which} lie inside')
         return EXIT_FAILED if faults else 0
     if options.map is not None:
         print('Tag,Command,Address,Station,PLC_Type,Processor,Length,Period'
