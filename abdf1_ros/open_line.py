@@ -140,7 +140,7 @@ class OpenLine:
     inactive station gets only one try for each request until it answers. To a PLC that asks for
     our identity we report a ``plc_type``. ``counters`` counts the events of the whole line. All
     bytes are written to the file ``trace``, for ``sniff``. Raises OSError if the port cannot be
-    opened or the file cannot be written, and ConfigurationError for a mode that only listens.
+    opened, and ConfigurationError if the file cannot be written or the mode only listens.
     """
 
     def __init__(self, mode: LineMode, line: LinkSettings, port: PortSettings,
@@ -269,14 +269,19 @@ class OpenLine:
 
 def traced(path: str, port: PortSettings, check: str, duplex: Duplex, open_it: Callable[[], Port],
            on_error: Callable[[str], None]) -> tuple[Callable[[], Port], Trace]:
-    """Begin a trace; return it after a function that opens the port and records its bytes."""
+    """
+    Begin a trace; return it after a function that opens the port and records its bytes.
+
+    Raises ConfigurationError if the file cannot be written.
+    """
     from abdf1_ros.ports.trace import begun_now, Trace, TracedPort
     try:
         trace = Trace(path, {'begun': begun_now(), 'port': port.name, 'baud': str(port.baud),
                              'check': check, 'duplex': duplex.name.lower()}, on_error)
-    except OSError:
+    except OSError as error:
         open_it().close()  # it was open already
-        raise
+        raise ConfigurationError([Problem(
+            error.filename or 'trace', error.strerror or str(error))]) from None
     begun = time.monotonic()
     return lambda: TracedPort(open_it(), trace, begun), trace
 

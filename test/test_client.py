@@ -191,10 +191,10 @@ def test_retries_trace_and_log_are_arguments(port: str, tmp_path: Path,
     assert sniff(['--summary', str(trace)]) == 0
     assert trace.read_text('ascii').splitlines()[2:6] == [
         f'# port: {port}', '# baud: 115200', '# check: CRC', '# duplex: half']
-    with pytest.raises(OSError) as error:
+    with pytest.raises(ConfigurationError) as error:
         client_with(port, trace=__file__)
     client_with(port).close()  # it is free, though the error keeps what was made before
-    assert 'exists and is not a capture' in str(error.value)
+    assert str(error.value).startswith(f'trace: {__file__} exists and is not a capture')
 
 
 def test_link_does_not_wait_for_a_handler_of_the_log(port: str) -> None:

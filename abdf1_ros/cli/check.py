@@ -26,6 +26,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 import json
 import math
+import os
 from pathlib import Path
 import shutil
 import sys
@@ -289,7 +290,7 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
     options = parser.parse_args(args)
     if options.map is None and options.heard:
         parser.error('--heard is for one line: give its net CSV and map CSV')
-    if options.map is None and not Path(options.net).is_dir():
+    if options.map is None and not os.path.isdir(options.net):
         parser.error(f'{printable(options.net)} is not a folder, so a map CSV must follow')
     if options.html and options.map is None:
         parser.error('--html is for one net CSV and one map CSV')

@@ -175,11 +175,15 @@ def drop_output() -> None:
 
 
 def has_reader_left(error: OSError, tell: Callable[[str], None]) -> bool:
-    """Return True if the reader of the output has left; ``tell`` any other error (a full disk)."""
+    """
+    Return True if the reader of the output has left; ``tell`` any other error.
+
+    An error without the name of a file is one of the output, such as a full disk.
+    """
     drop_output()
     if isinstance(error, BrokenPipeError):
         return True
-    tell(f'cannot print: {error.strerror or error}')
+    tell(reason_of(str(error.filename or 'cannot print'), error))
     return False
 
 

@@ -370,10 +370,12 @@ def test_folder_without_lines_is_refused(tmp_path: Path, capsys: Output) -> None
 
 def test_one_file_is_not_enough(files: Paths, capsys: Output) -> None:
     write_csv(files[0], NET_HEADER, [GOOD_NET])
-    for args, told in (([], f'{files[0]} is not a folder, so a map CSV must follow'),
-                       (['--heard', 'x.cap'], '--heard is for one line')):
+    net = str(files[0])
+    for args, told in (([net], f'{net} is not a folder, so a map CSV must follow'),
+                       (['long' * 99], 'longlong is not a folder, so a map'),
+                       ([net, '--heard', 'x.cap'], '--heard is for one line')):
         with pytest.raises(SystemExit):
-            main([str(files[0]), *args])
+            main(args)
         assert told in capsys.readouterr().err
 
 

@@ -204,7 +204,8 @@ def test_no_signal_interrupts_what_comes_after_the_block() -> None:
     (NoPort('/tmp/x', OSError(2, 'No such file')), 1, 'tool: /tmp/x: No such file\n'),
     (PortLost('the cable is gone'), 1, 'tool: port lost: the cable is gone\n'),
     (BrokenPipeError(), 7, ''),
-    (OSError(28, 'No space left on device'), 2, 'tool: cannot print: No space left on device\n')])
+    (OSError(28, 'No space left on device'), 2, 'tool: cannot print: No space left on device\n'),
+    (OSError(36, 'Name too long', 'a.csv'), 2, 'tool: a.csv: Name too long\n')])
 def test_end_of_a_command_is_told_and_is_its_status(
         end: BaseException | None, status: int, told: str, monkeypatch: pytest.MonkeyPatch,
         capsys: pytest.CaptureFixture[str]) -> None:

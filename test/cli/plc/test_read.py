@@ -24,7 +24,7 @@ from abdf1_ros.cli.plc.targets import to_read
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.network import Network
 import pytest
-from support.commands import call, FAST, Output, PATIENT, Plc, running_simulator
+from support.commands import call, FAST, Output, PATIENT, Plc, running_simulator, Said
 from support.ptys import Pty, wait_until
 from support.ros import Process, write_csv
 from support.simulator_process import Files
@@ -88,6 +88,9 @@ def test_rows_of_a_map_are_read_by_their_tags(plc: Plc, tmp_path: Path) -> None:
     assert (said.status, said.lines) == (0, ['N7:0 speed[0] 120 Hall 3', 'N7:1 speed[1] -80',
                                              'N7:0 speed[0] (raw) 1200'])
     assert capture.read_text('ascii').startswith('# abdf1_ros capture 1\n')
+    for verb in ('read', 'watch'):
+        said = plc(verb, 'N7:0', '--record', str(tmp_path / 'no' / 'line.cap'))
+        assert said == Said(2, '', f'plc: {tmp_path}/no/line.cap: No such file or directory\n')
     assert [line.split()[:2] for line in plc('read', '--map', str(path)).lines] == [
         ['N7:0', 'speed[0]'], ['N7:1', 'speed[1]'], ['N7:30', 'level']]
     said = plc('watch', 'speed', '--count', '1', '--map', str(path))
