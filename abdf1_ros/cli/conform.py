@@ -25,6 +25,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 import random
 import re
@@ -132,11 +133,16 @@ def main(args: Sequence[str] | None = None) -> int:
     target = Target(options.target)
     cases = [case for case in CASES if target in case.targets
              and (not options.only or case.name in options.only)]
-    return run_command('conform', lambda: _run(options, target, cases), EXIT_INTERRUPTED,
-                       EXIT_FAILED)
+
+    def run() -> int:
+        with ExitStack() as stack:
+            return _run(options, target, cases, stack)
+    return run_command('conform', run, EXIT_INTERRUPTED, EXIT_FAILED)
 
 
-def _run(options: argparse.Namespace, target: Target, cases: Sequence[Case]) -> int:
+def _run(options: argparse.Namespace, target: Target, cases: Sequence[Case],
+         stack: ExitStack) -> int:
+    """Run the cases on the line, which ``stack`` closes."""
     if options.list:
         for case in cases:
             print(f'{case.name:24} {case.source:16} {case.rule}')
@@ -146,7 +152,7 @@ def _run(options: argparse.Namespace, target: Target, cases: Sequence[Case]) -> 
     asks = target in (Target.SLAVE, Target.PEER, Target.RADIO)
     serve = None if asks else _server(options, network)
     try:
-        line = _open(options, network)
+        line = _open(options, network, stack)
     except OSError as error:
         name = options.pty or network.port if options.tcp is None else '--tcp'
         raise NoPort(name, error) from None
@@ -160,8 +166,6 @@ def _run(options: argparse.Namespace, target: Target, cases: Sequence[Case]) -> 
     except OSError as error:
         tell('conform', f'the line was lost: {reason_of("", error)}')
         return EXIT_FAILED
-    finally:
-        line.close()
 
 
 def _judge(options: argparse.Namespace, target: Target, cases: Sequence[Case], wire: Wire,
@@ -258,19 +262,26 @@ def _server(options: argparse.Namespace, network: Network) -> Serve:
     return lambda command: plc.serve(Packet.decode(command)).encode()
 
 
-def _open(options: argparse.Namespace, network: Network) -> _PortLine:
+def _open(options: argparse.Namespace, network: Network, stack: ExitStack) -> _PortLine:
     """Open the line; a pseudo-terminal or TCP port waits for its client."""
-    line: Endpoint
+    line = _PortLine(_port(options, network, stack), options.echo)
+    stack.callback(line.close)
+    return line
+
+
+def _port(options: argparse.Namespace, network: Network, stack: ExitStack) -> Port:
+    end: Endpoint
     if options.tcp is not None:
-        line = TcpEndpoint(*options.tcp)
+        end = TcpEndpoint(*options.tcp)
     elif options.pty is not None:
-        line = PtyEndpoint(options.pty)
+        end = PtyEndpoint(options.pty)
     else:
-        return _PortLine(open_port(PortSettings.of(network)), options.echo)
-    tell('conform', f'at {line.name}')
+        return open_port(PortSettings.of(network))
+    stack.callback(end.close)
+    tell('conform', f'at {end.name}')
     while True:
         try:
-            return _PortLine(line.open(), options.echo)
+            return end.open()
         except OSError:  # no client yet; Ctrl-C ends it
             time.sleep(0.05)
 
