@@ -23,12 +23,9 @@ from functools import cache, partial
 from importlib import import_module
 from keyword import iskeyword
 from pathlib import Path
-import re
 from types import ModuleType
 
 from abdf1_ros.cli.terminal import command_parser
-
-_ASSIGNMENT = re.compile(r'[A-Z]{1,3}\d{0,3}:[^=]+=.+', re.ASCII | re.IGNORECASE)
 
 _STATUSES = """\
 exit status:
@@ -93,12 +90,9 @@ def _complete(name: str, parser: argparse.ArgumentParser) -> None:
 
 
 def help_asked(words: Sequence[str]) -> Sequence[str]:
-    """Return the words to parse: "help" stands for --help, N7:10=5 for two words."""
+    """Return the words to parse: "help" stands for --help."""
     if words[:1] == ['help']:
         return [*words[1:2], '--help']
-    if [*words[:1]] == ['write']:  # N7:10=5
-        words = [part for word in words for part in (
-            word.split('=', 1) if _ASSIGNMENT.fullmatch(word) else [word])]
     return [words[0], '--help'] if words[1:] == ['help'] else words
 
 

@@ -24,7 +24,9 @@ from __future__ import annotations
 
 import argparse
 from functools import partial
+import re
 import sys
+from typing import Any
 
 from abdf1_ros.cli.plc import data
 from abdf1_ros.cli.plc.asking import ask, check_type, failed, mappings_of
@@ -46,17 +48,36 @@ from abdf1_ros.errors import Abdf1Error
 UNREAD_STATUS = EXIT_USAGE
 """Exit status if the output cannot be printed: the write has not begun, so nothing was written."""
 
+_ASSIGNMENT = re.compile(r'[A-Z]{1,3}\d{0,3}:[^=]+=.+', re.ASCII | re.IGNORECASE)
+
 _UNCERTAIN = (Outcome.UNKNOWN, Outcome.PARTLY)
+
+
+class _AddressAction(argparse.Action):
+    """Take an address; N7:10=5 is the first of the ``values`` too."""
+
+    values: argparse.Action
+
+    def __call__(self, parser: argparse.ArgumentParser, namespace: argparse.Namespace,
+                 values: Any, option_string: str | None = None) -> None:
+        namespace.address = values
+        if _ASSIGNMENT.fullmatch(values):
+            namespace.address, value = values.split('=', 1)
+            namespace.values = [value]
+            self.values.required = False
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments."""
     add_data_options(
         parser, f'(required in half duplex; default in full duplex: {DEFAULT_STATION})')
-    parser.add_argument('address', metavar='ADDRESS',
-                        help='PLC address such as N7:10, B3:0/5, F8:2; with --map: a tag')
-    parser.add_argument('values', metavar='VALUE', nargs='+',
-                        help='numbers, also as 0x or 0b; 0 or 1 for bits; one text for a string')
+    address = parser.add_argument(
+        'address', metavar='ADDRESS', action=_AddressAction,
+        help='PLC address such as N7:10, B3:0/5, F8:2; with --map: a tag')
+    assert isinstance(address, _AddressAction)
+    address.values = parser.add_argument(
+        'values', metavar='VALUE', nargs='+', action='extend',
+        help='numbers, also as 0x or 0b; 0 or 1 for bits; one text for a string')
     parser.add_argument('--map', metavar='FILE',
                         help='a map CSV: ADDRESS is then the tag of a row; Scale, Min, Max and '
                              'Station of the row apply')
