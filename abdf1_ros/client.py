@@ -67,6 +67,7 @@ from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.spellings import family_name
 from abdf1_ros.pccc.steps import AddressedValues
+from abdf1_ros.pccc.strings import is_string_element
 from abdf1_ros.pccc.values import ValueType, WordOrder
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.text import shown
@@ -215,8 +216,9 @@ class Client(OpenLine):
               *, word_order: str = 'Low', station: int | None = None) -> None:
         """Write one or more values from an address on; return when the PLC has confirmed all."""
         values = values_of(values)
-        is_packed = isinstance(values, str) and kind is not None
-        length = (len(values) + 1) // 2 if is_packed else \
+        is_packed = isinstance(values, str) and kind is not None and not is_string_element(
+            text_of('address', address))
+        length = max(1, (len(values) + 1) // 2) if is_packed else \
             1 if isinstance(values, str) else len(values)
         number, target = self._target(address, length, kind, word_order, station)
         with self.naming(_place(address, number)):

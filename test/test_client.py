@@ -91,9 +91,13 @@ def test_what_is_written_is_read(port: str, station: int, plc_type: str | None) 
         plc.write('B3:0/1', True)
         plc.write('F8:1', 1.5)
         plc.write('T4:1.PRE', 500)
+        for recipe in ('x' * 82, ''):
+            plc.write('#st9:0', recipe, 'string')
+            assert plc.read('ST9:0') == recipe
         plc.write('ST9:0', 'recipe 7')
         plc.write('A10:0', 'vwxyz', 'string')
         plc.write('A10:0', 'ab', 'string')
+        plc.write('A10:2', '', 'string')
         before = plc.counters.commands_sent
         assert plc.read('N7:0') == -1
         assert plc.counters.commands_sent == before + 1  # it is known what the PLC is
@@ -111,7 +115,7 @@ def test_what_is_written_is_read(port: str, station: int, plc_type: str | None) 
         assert plc.read('T4:1.PRE') == 500
         assert plc.read('T4:0.ACC', 4) == [0, 0, 500, 0]  # to T4:1.ACC, past a control word
         assert plc.read('ST9:0') == 'recipe 7'
-        assert plc.read('A10:0', 3, 'string').rstrip('\0') == 'abxyz'
+        assert plc.read('A10:0', 3, 'string').rstrip('\0') == 'abxy'
 
 
 def test_values_of_several_packets_are_written_and_read(port: str, plcs: PlcPair) -> None:

@@ -20,10 +20,19 @@ Characters are Latin-1, two in a word, the first of them in the high byte.
 
 from __future__ import annotations
 
+import re
+
 from abdf1_ros.errors import FormatError
 
 COUNTED_CHARACTERS = 82  # of an ST element, after its length word
 COUNTED_WORDS = 1 + COUNTED_CHARACTERS // 2
+
+_ELEMENT = re.compile(r'[#$]?ST\d*[:;]', re.ASCII | re.IGNORECASE)
+
+
+def is_string_element(address: str) -> bool:
+    """Tell whether an address, in any family, is that of an ST element."""
+    return _ELEMENT.match(address.strip()) is not None
 
 
 def decode_counted(data: bytes) -> str:

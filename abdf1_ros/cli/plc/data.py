@@ -38,6 +38,7 @@ from abdf1_ros.pccc.address_range import AddressRange, is_element
 from abdf1_ros.pccc.families import FAMILIES, parse_range
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.processor import Processor, USUAL
+from abdf1_ros.pccc.strings import is_string_element
 from abdf1_ros.pccc.structures import named_runs
 from abdf1_ros.pccc.values import Values, ValueType
 from abdf1_ros.problems import ConfigurationError, Problem
@@ -162,7 +163,7 @@ def _in_arguments(fault: CellFault, row: Row) -> Problem:
 
 def length_of(address: str, kind: str | None, texts: Sequence[str]) -> int:
     """Return the Length of a write; in A and N files a string has two characters per word."""
-    if address.upper().startswith('ST'):
+    if is_string_element(address):
         return 1
     is_packed = kind == ValueType.STRING.value
     return max(1, (len(texts[0]) + 1) // 2) if is_packed else len(texts)
