@@ -47,7 +47,7 @@ RED, YELLOW, GREEN = 31, 33, 32
 # Exit statuses of all commands: 1 for failures of a port or a run, 2 for bad files or arguments.
 EXIT_FAILED = 1
 EXIT_USAGE = 2
-EXIT_UNKNOWN = 3  # of "plc write"
+EXIT_UNKNOWN = 3  # of "plc write" and "plc clock"
 EXIT_INTERRUPTED = 130
 
 _ENDING = (signal.SIGINT, signal.SIGTERM)

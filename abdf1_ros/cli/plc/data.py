@@ -26,7 +26,8 @@ import re
 import time
 from typing import TypeAlias
 
-from abdf1_ros.cli.plc.session import Session
+from abdf1_ros.cli.plc.session import complain, Session
+from abdf1_ros.cli.terminal import EXIT_FAILED, EXIT_UNKNOWN
 from abdf1_ros.driver.write import Outcome, show, Write, WriteResult
 from abdf1_ros.driver.writes.packets import carry_out
 from abdf1_ros.errors import Abdf1Error, FormatError, PortLost
@@ -58,6 +59,8 @@ _UNIT = re.compile(r'\[(?P<unit>[^][]{1,12})\]$')
 _VALUES_IN_ROW = 10
 _BITS_IN_ROW = 16
 _BETWEEN = '  '
+
+_UNCERTAIN = (Outcome.UNKNOWN, Outcome.PARTLY)
 
 # Tags of a map, by address.
 Tags: TypeAlias = MappingType[str, str]
@@ -207,6 +210,14 @@ def remarks_of_write(mapping: Mapping) -> Iterator[str]:
     if mapping.fallback is not None:
         yield (f'{named(mapping)} has a Fallback, which only the bridge writes: no '
                'Fallback follows this write')
+
+
+def status_of(result: WriteResult) -> int:
+    """Print why a write is not confirmed; return the exit status, 0 if it is."""
+    if result.outcome is Outcome.WRITTEN:
+        return 0
+    complain(f'{named(result.mapping)} of station {result.mapping.station}: {result}')
+    return EXIT_UNKNOWN if result.outcome in _UNCERTAIN else EXIT_FAILED
 
 
 class Writing:

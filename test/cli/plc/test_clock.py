@@ -79,7 +79,7 @@ def test_clock_is_set_when_that_is_wanted(
     assert said.status == 0, said
     # The clock has whole seconds, and a busy host may take some more.
     assert re.search('(as|0:00:0[23] behind) this computer$', said.lines[0])
-    monkeypatch.setattr(Clock, 'write', lambda self: None)  # these words are not the clock
+    monkeypatch.setattr(Clock, 'write', lambda self: 0)  # these words are not the clock
     set_clock(plcs[station - 1], before)
     said = call(main, capsys, *args, '--yes')
     assert (said.status, 'its clock has not changed' in said.err) == (1, True)
@@ -105,7 +105,8 @@ def test_drift_counts_from_the_middle_of_the_read(monkeypatch: pytest.MonkeyPatc
     (('1',), 1,
      'S2:37 of station 1: holds no date and time: 0 0 0 0 0 0; is its clock switched off?\n'),
     (('3',), 1, 'station 3: is a PLC-2, whose clock is not known\n'),
-    (('4', '--set', '--yes'), 1, 'S2:37 of station 4: STS 50: address not there, or memory'),
+    (('4', '--set', '--yes'), 1,
+     'S2:37 of station 4: not written: the PLC refused it: STS 50: address not there'),
     (('--set', '--yes'), 2, '--station: give the station to write to: ')])
 def test_clock_that_cannot_be_had_is_told(
         port: str, capsys: Output, args: tuple[str, ...], status: int, text: str) -> None:

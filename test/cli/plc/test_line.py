@@ -185,7 +185,8 @@ def test_value_that_looks_like_an_option_goes_last() -> None:
 def test_value_may_come_after_options() -> None:
     for words, values in ((('N7:10', '--station', '2', '5'), ['5']), (('N7:10=5',), ['5']),
                           (('--net', 'a:1=3', 'N7:10=5', '6'), ['5', '6']),
-                          (('N7:10=a=b',), ['a=b']), (('--yes', 'N7:10', 'LOT:12=3'), ['LOT:12=3'])):
+                          (('N7:10=a=b',), ['a=b']),
+                          (('--yes', 'N7:10', 'LOT:12=3'), ['LOT:12=3'])):
         options = parse('write', *words)
         assert (options.address, options.values) == ('N7:10', values)
         assert options.net in (None, 'a:1=3')

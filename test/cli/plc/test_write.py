@@ -217,10 +217,11 @@ def test_write_that_fails_says_what_came_of_it(
     assert text in said.err
 
 
-def test_write_broken_off_is_unknown(tmp_path: Path) -> None:
+@pytest.mark.parametrize('write', ['write N7:0 1 --station 1', 'clock 1 --set'])
+def test_write_broken_off_is_unknown(tmp_path: Path, write: str) -> None:
     line = Pty(tmp_path / 'line')
-    with Process('plc', 'write', 'N7:0', '1', '--yes', '--plc-type', 'SLC', '--station', '1',
-                 '--port', str(line.name), '--timeout', '9000') as process:
+    with Process('plc', *write.split(), '--yes', '--plc-type', 'SLC', '--port', str(line.name),
+                 '--timeout', '9000') as process:
         line.read(10)  # the command is on its way
         wait_until(lambda: process.catches(signal.SIGTERM))
         process.send(*[signal.SIGINT] * 3)

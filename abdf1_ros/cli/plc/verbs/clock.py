@@ -24,17 +24,17 @@ from __future__ import annotations
 import argparse
 from datetime import datetime, timedelta
 
-from abdf1_ros.cli.plc.asking import ask, failed, family_of
+from abdf1_ros.cli.plc import data
+from abdf1_ros.cli.plc.asking import ask, check_type, failed, family_of
 from abdf1_ros.cli.plc.options import add_plc_type, add_station
 from abdf1_ros.cli.plc.session import complain, Session
-from abdf1_ros.cli.terminal import EXIT_FAILED, EXIT_USAGE, is_wanted
+from abdf1_ros.cli.terminal import EXIT_FAILED, EXIT_UNKNOWN, EXIT_USAGE, is_wanted
 from abdf1_ros.errors import Abdf1Error, FormatError
-from abdf1_ros.pccc import steps
 from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor
-from abdf1_ros.pccc.steps import AddressedValues
 from abdf1_ros.pccc.values import ValueType
+from abdf1_ros.settings.mapping import Command
 
 # A larger difference right after a write means that the clock has not accepted the time.
 _TAKEN = timedelta(seconds=3)
@@ -65,7 +65,10 @@ def _clock(options: argparse.Namespace, session: Session) -> int:
                 f'set the clock of station {options.station} ({clock.address})'):
             complain('nothing was written; --yes writes')
             return EXIT_USAGE
-        clock.write()
+        if status := clock.write():
+            if status != EXIT_UNKNOWN:
+                check_type(options, session, options.station)
+            return status
         time, ahead = clock.read()
     except Abdf1Error as error:
         return failed(options, session, error, clock.address)
@@ -91,14 +94,16 @@ class Clock:
             raise FormatError(f'is a {family.addressing.title}, whose clock is not known')
         if processor is not None and not processor.has_clock:
             raise FormatError(_why_none(processor))
-        self._session, self._station = session, station
-        self._words = AddressedValues.of(family.clock, plc_type, 6, ValueType.UINT16)
-        self.address = str(self._words.address)
+        self._session = session
+        self._mapping = data.mapping_of(family.clock, {
+            'Command': Command.READ_WRITE.value, 'Station': str(station), 'Length': '6',
+            'Type': ValueType.UINT16.value, 'PLC_Type': plc_type.value})
+        self.address = str(self._mapping.address)
 
     def read(self) -> tuple[datetime, timedelta]:
         """Return the PLC's time, and its lead over this computer's local time."""
         begun = datetime.now()
-        values = self._session.ask(self._station, steps.read(self._words))
+        values = data.read(self._session, self._mapping)
         ended = datetime.now()
         try:
             found = datetime(*values)
@@ -107,11 +112,10 @@ class Clock:
                               + ('' if any(values) else '; is its clock switched off?')) from None
         return found, found - (begun + (ended - begun) / 2)
 
-    def write(self) -> None:
-        """Set the clock to this computer's local time, to the second."""
-        now = datetime.now()
-        values = now.year, now.month, now.day, now.hour, now.minute, now.second
-        self._session.ask(self._station, steps.write(self._words, values))
+    def write(self) -> int:
+        """Set the clock to this computer's local time, to the second; return the exit status."""
+        texts = [*map(str, datetime.now().timetuple()[:6])]
+        return data.status_of(data.Writing(self._mapping, texts).carry_out(self._session))
 
 
 def _why_none(processor: Processor) -> str:

@@ -36,21 +36,17 @@ from abdf1_ros.cli.plc.targets import no_value, Targets, to_write
 from abdf1_ros.cli.terminal import (
     colour,
     drop_output,
-    EXIT_FAILED,
     EXIT_UNKNOWN,
     EXIT_USAGE,
     GREEN,
     is_wanted,
 )
-from abdf1_ros.driver.write import Outcome
 from abdf1_ros.errors import Abdf1Error
 
 UNREAD_STATUS = EXIT_USAGE
 """Exit status if the output cannot be printed: the write has not begun, so nothing was written."""
 
 _ASSIGNMENT = re.compile(r'[A-Z]{1,3}\d{0,3}:[^=]+=.+', re.ASCII | re.IGNORECASE)
-
-_UNCERTAIN = (Outcome.UNKNOWN, Outcome.PARTLY)
 
 
 class _AddressAction(argparse.Action):
@@ -121,12 +117,10 @@ def _is_confirmed(options: argparse.Namespace, session: Session, writing: data.W
 def _carry_out(session: Session, writing: data.Writing) -> int:
     """Write, show the values in the PLC after it, and return the exit status."""
     mapping = writing.mapping
-    place = f'{data.named(mapping)} of station {mapping.station}'
     result = writing.carry_out(session)
-    text = str(result)
-    if result.outcome is not Outcome.WRITTEN:
-        complain(f'{place}: {text}')
-        return EXIT_UNKNOWN if result.outcome in _UNCERTAIN else EXIT_FAILED
+    if status := data.status_of(result):
+        return status
+    place, text = f'{data.named(mapping)} of station {mapping.station}', str(result)
     try:
         print(f'{place}: {colour(text, GREEN, sys.stdout)}; now:', flush=True)
         data.print_values(mapping, data.read(session, mapping))
