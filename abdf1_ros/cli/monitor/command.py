@@ -101,23 +101,23 @@ examples:
 
 
 class _Ending:
-    """Callable: True after a signal, or when the time is up."""
+    """Callable: True after a signal (``is_signalled``), or when the time is up."""
 
     def __init__(self) -> None:
         self._end = math.inf
-        self._signalled = False
+        self.is_signalled = False
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self._signal)
 
     def __call__(self) -> bool:
-        return self._signalled or time.monotonic() >= self._end
+        return self.is_signalled or time.monotonic() >= self._end
 
     def limit(self, seconds: float) -> None:
         """End ``seconds`` from now."""
         self._end = time.monotonic() + seconds
 
     def _signal(self, number: int, frame: FrameType | None) -> None:
-        self._signalled = True
+        self.is_signalled = True
         limit_output()
 
 
@@ -269,7 +269,7 @@ def _print_all(plant: PlantWatch, options: argparse.Namespace, has_ended: _Endin
     plant.wait(has_ended, _COMPLETION)  # diagnostics come every second
     _print_pictures(plant, lambda width: render_plant(plant.lines(), time.monotonic(), width),
                     options, has_ended)
-    return 0 if plant.lines() else EXIT_FAILED
+    return 0 if plant.lines() or has_ended.is_signalled else EXIT_FAILED
 
 
 def _draw_all(window: curses.window, plant: PlantWatch, has_ended: _Ending, marked: str) -> str:

@@ -16,6 +16,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+import signal
 import time
 
 from abdf1_ros.cli.monitor import plant
@@ -138,7 +139,10 @@ def test_spare_is_named() -> None:
         '/a OK 93 % 34 ms of 10 mappings 10 fresh; spare: beta'
 
 
-def test_nobody_is_heard(capsys: Output) -> None:
+def test_nobody_is_heard(capsys: Output, monkeypatch: pytest.MonkeyPatch) -> None:
     said = call(main, capsys, '--all', '--once', '--wait', '0.1', '--seconds', '0.2')
     assert (said.status, said.out.splitlines()[0]) == (
         1, 'no line is heard; diagnostics come every second')
+    monkeypatch.setattr('abdf1_ros.cli.monitor.command.limit_output', lambda: None)
+    monkeypatch.setattr(PlantWatch, 'wait', lambda *_: signal.raise_signal(signal.SIGINT))
+    assert call(main, capsys, '--all', '--once').status == 0
