@@ -174,6 +174,7 @@ def test_silent_station_is_seen_by_every_means(bridge: Bridge) -> None:
         assert details(status)['active'] == 'no'
         status = until_status(bridge.diagnostics, 'link', WARN)
         assert status.message == 'WARN: port open, 1 of 2 stations do not answer'
+        assert details(status)['diagnostics period'] == '0.25 s'
         status = until_status(bridge.diagnostics, 'mappings', ERROR,
                               lambda status: [details(status)[key] for key in (
                                   'failed', 'late', 'stale')] == ['12', '0', '0'])

@@ -323,6 +323,13 @@ def test_link_of_a_node_with_a_duplicate_name(bench: Bench) -> None:
     assert bench.says('link') == (ERROR, 'ERROR: gone; another node is called /line_a too')
 
 
+def test_link_and_standby_tell_how_often_diagnostics_come(bench: Bench) -> None:
+    bench.seen.diagnostics_period = 10.0
+    for is_waiting in (False, True):
+        status = bench.diagnostics.statuses(NOW, is_waiting=is_waiting)[0]
+        assert details(status)['diagnostics period'] == '10 s'
+
+
 def test_fault_is_logged_when_it_begins_and_again_after_it_was_over(bench: Bench) -> None:
     faults, stations = ['', LOST, LOST, '', LOST], bench.driver.stations
     guest: Any = SimpleNamespace(guest=Guest('pty:a'), fault='')

@@ -266,7 +266,9 @@ def _run_all(options: argparse.Namespace, words: list[str], has_ended: _Ending) 
 
 def _print_all(plant: PlantWatch, options: argparse.Namespace, has_ended: _Ending) -> int:
     plant.wait(lambda: has_ended() or bool(plant.lines()), options.wait)
-    plant.wait(has_ended, _COMPLETION)  # diagnostics come every second
+    plant.wait(has_ended, _COMPLETION)  # usually diagnostics come every second
+    if options.once:
+        plant.wait(lambda: has_ended() or plant.is_complete, options.wait)
     _print_pictures(plant, lambda width: render_plant(plant.lines(), time.monotonic(), width),
                     options, has_ended)
     return 0 if plant.lines() or has_ended.is_signalled else EXIT_FAILED

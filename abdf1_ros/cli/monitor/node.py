@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 import time
 
 from abdf1_ros.cli.monitor.curves import Curve
-from abdf1_ros.cli.monitor.view import NodeView, Reading, ShownStatus, SILENCE, Style
+from abdf1_ros.cli.monitor.view import NodeView, Reading, ShownStatus, silence, Style
 from abdf1_ros.errors import FormatError
 from abdf1_ros.ros.observer import graph_hint, ObservingNode
 from abdf1_ros.ros.topics.messages import latched_qos, MESSAGES
@@ -83,6 +83,14 @@ class Listening(ObservingNode):
         return self.node.create_subscription(
             message_type, topic, callback, qos, event_callbacks=_QUIET)
 
+    def bridges(self) -> list[str]:
+        """Return the full names of the visible bridges."""
+        ending = '/active_stations'
+        return sorted((topic.removesuffix(ending)
+                       for topic, types in self.node.get_topic_names_and_types()
+                       if topic.endswith(ending) and self.node.count_publishers(topic)),
+                      key=by_number)
+
 
 class NodeWatch(Listening):
     """
@@ -125,14 +133,6 @@ class NodeWatch(Listening):
             self._next_discovery = time.monotonic() + _DISCOVERY_PERIOD
             self._discover()
         super().spin_once(seconds)
-
-    def bridges(self) -> list[str]:
-        """Return the full names of the visible bridges."""
-        ending = '/active_stations'
-        return sorted((topic.removesuffix(ending)
-                       for topic, types in self.node.get_topic_names_and_types()
-                       if topic.endswith(ending) and self.node.count_publishers(topic)),
-                      key=by_number)
 
     def snapshot(self) -> NodeView:
         """Return a snapshot of the present state."""
@@ -192,8 +192,8 @@ class NodeWatch(Listening):
 
     def _take_diagnostics(self, message: DiagnosticArray) -> None:
         statuses, now = shown_statuses(message, self.name.lstrip('/')), time.monotonic()
-        is_owner_heard = self._told is not None and now - self._told <= SILENCE \
-            and not is_spare(self._statuses)
+        is_owner_heard = self._told is not None and not is_spare(self._statuses) \
+            and now - self._told <= silence(self._statuses)
         if statuses and not (is_spare(statuses) and is_owner_heard):
             self._statuses, self._told = statuses, now
 

@@ -26,7 +26,7 @@ from dataclasses import dataclass, replace
 import time
 
 from abdf1_ros.cli.monitor.node import Listening, shown_statuses
-from abdf1_ros.cli.monitor.view import LEVELS, ShownStatus, SILENCE, Style, TextLine
+from abdf1_ros.cli.monitor.view import LEVELS, ShownStatus, silence, Style, TextLine
 from abdf1_ros.text import by_number, counted, cut, printable
 from diagnostic_msgs.msg import DiagnosticArray
 
@@ -48,9 +48,13 @@ class LineState:
     statuses: Sequence[ShownStatus]
     spares: Sequence[str] = ()
 
+    def is_silent(self, now: float) -> bool:
+        """Tell whether diagnostics are missing at the clock value ``now`` (s)."""
+        return now - self.told > silence(self.statuses)
+
     def worst(self, now: float) -> ShownStatus:
         """Return the most important status at the clock value ``now`` (s)."""
-        if now - self.told > SILENCE:
+        if self.is_silent(now):
             return ShownStatus('', Style.BAD, f'no diagnostics for {now - self.told:.0f} s')
         return min(self.statuses, key=lambda status: status.rank)
 
@@ -66,7 +70,7 @@ class PlantWatch(Listening):
     def __init__(self, ros_arguments: list[str]) -> None:
         super().__init__(ros_arguments)
         self._lines: dict[str, LineState] = {}
-        # clock value of the last message, by line and host
+        # clock value up to which the last message counts, by line and host
         self._waiting: dict[str, dict[str, float]] = {}
         self.subscribe(DiagnosticArray, '/diagnostics', self._take, 1000)
 
@@ -76,16 +80,20 @@ class PlantWatch(Listening):
         found = {name: replace(line, spares=self._spares(name, now))
                  for name, line in self._lines.items()}
         for name in self._waiting:
-            if (name not in found or now - found[name].told > SILENCE) \
+            if (name not in found or found[name].is_silent(now)) \
                     and (spares := self._spares(name, now)):
                 found[name] = LineState(name, now, [ShownStatus(
                     '', Style.BAD, f'no bridge has the line; waiting: {", ".join(spares)}')])
         return [*found.values()]
 
+    @property
+    def is_complete(self) -> bool:
+        """Return True if all visible bridges were heard."""
+        return {*self.bridges()} <= {*self._lines, *self._waiting}
+
     def _spares(self, name: str, now: float) -> list[str]:
         """Return the hosts that wait for a line."""
-        return sorted(host for host, told in self._waiting.get(name, {}).items()
-                      if now - told <= SILENCE)
+        return sorted(host for host, until in self._waiting.get(name, {}).items() if now <= until)
 
     def _take(self, message: DiagnosticArray) -> None:
         node = message.status[0].name.partition(': ')[0] if message.status else ''
@@ -99,7 +107,7 @@ class PlantWatch(Listening):
                         name, now, [ShownStatus('', Style.BAD, f'does not run: {reason}')])
         elif 'standby' in sections:
             host = sections['standby'].values.get('host', '')
-            self._waiting.setdefault(f'/{node}', {})[host] = now
+            self._waiting.setdefault(f'/{node}', {})[host] = now + silence(statuses)
         elif 'link' in sections and 'mappings' in sections:
             self._lines[f'/{node}'] = LineState(f'/{node}', now, statuses)
 

@@ -21,16 +21,20 @@ This module uses neither ROS nor a terminal: ``monitor.node`` fills a ``NodeView
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 import textwrap
 
 from abdf1_ros.cli.monitor import curves
+from abdf1_ros.numbers import decimal_number
 from abdf1_ros.text import BARS, counted, cut, printable, value_text
 
-# The picture reports a longer time (s) without diagnostics. By default they come every second.
+# A bridge without diagnostics for this time (s) counts as silent. By default they come every
+# second; else they may be late by so many seconds.
 SILENCE = 3.0
+_LATE = 2.0
+_DIAGNOSTICS_PERIOD = 'diagnostics period'
 
 # Most characters of names and addresses; the values get the rest of the line.
 _NAME_WIDTH = 30
@@ -146,6 +150,13 @@ class ShownStatus:
         return text if is_plain else f'{self.section}: {text}'
 
 
+def silence(statuses: Iterable[ShownStatus]) -> float:
+    """Return the time (s) without diagnostics after which the bridge of these counts as silent."""
+    told = (status.values.get(_DIAGNOSTICS_PERIOD, '') for status in statuses)
+    periods = (decimal_number(text.removesuffix(' s')) for text in told)
+    return max([SILENCE, *(period + _LATE for period in periods if period is not None)])
+
+
 @dataclass(frozen=True, slots=True)
 class NodeView:
     """
@@ -226,7 +237,7 @@ def _heard(snapshot: NodeView, now: float) -> Iterator[ShownStatus]:
         remapped = '; if /diagnostics is remapped, monitor needs the same -r' \
             if snapshot.is_there else ''
         yield ShownStatus('', Style.WARNING, f'no diagnostics yet{remapped}')
-    elif now - snapshot.told > SILENCE:
+    elif now - snapshot.told > silence(snapshot.statuses):
         yield ShownStatus('', Style.BAD, f'no diagnostics for {now - snapshot.told:.1f} s')
 
 

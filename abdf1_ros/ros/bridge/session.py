@@ -116,7 +116,8 @@ class BridgeSession:
         node, parameters = surroundings.node, configuration.parameters
         network, mappings = configuration.network, configuration.mappings
         self.reads = ReadTopics(node, surroundings.published)
-        seen = Seen(lambda: surroundings.names.text, latest=self.reads.latest)
+        seen = Seen(lambda: surroundings.names.text, latest=self.reads.latest,
+                    diagnostics_period=parameters.diagnostics_period)
         self.events = LineEvents(
             node.get_logger(), self.port, stations_of(mappings),
             scans=not network.line_mode.has_one_plc, seen=seen, read=self._reader(),

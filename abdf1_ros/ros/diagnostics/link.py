@@ -29,7 +29,7 @@ from abdf1_ros.pccc.link_counters import NO_MEMORY, UNSENT
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.link_thread import RELEASED
 from abdf1_ros.ros.diagnostics.line import LineView, takes_in_silence
-from abdf1_ros.ros.diagnostics.status import ERROR, Judgement, OK, Seen, WARN, with_age
+from abdf1_ros.ros.diagnostics.status import ERROR, Judgement, OK, period_of, Seen, WARN, with_age
 from abdf1_ros.settings.network import Network
 from abdf1_ros.text import counted, milliseconds
 
@@ -118,6 +118,7 @@ class LinkStatus:
             **{f'refused: {text}': f'{count} times'
                for text, count in driver.refused.counted().items()},
             **{name: str(count) for name, count in (opener.errors() if opener else {}).items()},
+            **period_of(self._seen),
             'files': changed_text(self._seen.changed_files) or 'as read',
             'last error': with_age(self._seen.last_error, now),
         }

@@ -19,7 +19,7 @@ from __future__ import annotations
 import socket
 
 from abdf1_ros.ros.diagnostics.line import LineView
-from abdf1_ros.ros.diagnostics.status import Judgement, OK, Seen, WARN
+from abdf1_ros.ros.diagnostics.status import Judgement, OK, period_of, Seen, WARN
 
 
 class StandbyStatus:
@@ -42,4 +42,4 @@ class StandbyStatus:
         return OK, text
 
     def values(self, now: float) -> dict[str, str]:
-        return {'host': socket.gethostname()}
+        return {'host': socket.gethostname(), **period_of(self._seen)}

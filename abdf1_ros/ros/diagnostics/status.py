@@ -71,6 +71,8 @@ class Seen:
     """The last unusual event of each station."""
     last_fallbacks: dict[int, Moment] = field(default_factory=dict)
     """The last fallback value of each station."""
+    diagnostics_period: float = 1.0
+    """Seconds between two messages of all statuses."""
 
 
 def message_of(name: str, level: bytes, text: str, place: str,
@@ -80,6 +82,11 @@ def message_of(name: str, level: bytes, text: str, place: str,
         level=level, name=printable(name), message=printable(text), hardware_id=printable(place),
         values=[KeyValue(key=printable(key), value=printable(value))
                 for key, value in values.items()])
+
+
+def period_of(seen: Seen) -> dict[str, str]:
+    """Return the value that tells how soon the next message comes."""
+    return {'diagnostics period': f'{seen.diagnostics_period:g} s'}
 
 
 def with_age(moment: Moment | None, now: float) -> str:

@@ -19,7 +19,7 @@ import time
 from types import SimpleNamespace
 from typing import Any
 
-from abdf1_ros.cli.monitor import node
+from abdf1_ros.cli.monitor import view
 from abdf1_ros.cli.monitor.node import full_name, NodeWatch
 from abdf1_ros.cli.monitor.view import NodeView, Reading, Style
 from abdf1_ros.errors import FormatError
@@ -183,7 +183,7 @@ def test_spare_of_the_same_name_does_not_hide_the_owner_of_the_line(
     until(watch, lambda picture: [status.section for status in picture.statuses] == ['link'])
     watch.spin_once(0.2)
     assert [status.section for status in watch.snapshot().statuses] == ['link']
-    monkeypatch.setattr(node, 'SILENCE', 0.0)  # the owner has been silent for so long
+    monkeypatch.setattr(view, 'SILENCE', 0.0)  # the owner has been silent for so long
     bridge.status('cell/line_a: standby', 'OK: waits', DiagnosticStatus.OK)
     until(watch, lambda picture: [status.section for status in picture.statuses] == ['standby'])
 

@@ -19,7 +19,7 @@ from dataclasses import replace
 import signal
 import time
 
-from abdf1_ros.cli.monitor import plant
+from abdf1_ros.cli.monitor import view
 from abdf1_ros.cli.monitor.command import main
 from abdf1_ros.cli.monitor.plant import LineState, PlantWatch, render_plant
 from abdf1_ros.cli.monitor.view import ShownStatus, SILENCE, Style
@@ -57,6 +57,9 @@ def test_line_that_is_not_heard_any_more_is_bad() -> None:
     told = texts(line('/a', told=NOW - 5.0))
     assert told[0] == '1 line: 1 ERROR'
     assert told[2] == '/a ERROR 93 % 34 ms no diagnostics for 5 s'
+    seldom = replace(LINK, section='link', values={'diagnostics period': '10 s'})
+    assert [texts(line('/a', seldom, told=NOW - age))[0] for age in (11.9, 12.1)] == [
+        '1 line: 1 OK', '1 line: 1 ERROR']
 
 
 def test_no_line_at_all() -> None:
@@ -102,7 +105,8 @@ def publish() -> Iterator[Publish]:
         node.destroy_node()
 
 
-def test_bridges_are_heard_and_others_are_not(publish: Publish) -> None:
+def test_bridges_are_heard_and_others_are_not(
+        publish: Publish, monkeypatch: pytest.MonkeyPatch) -> None:
     down = array('lines', lines=ERROR)
     down.status[0].values = [KeyValue(key='running', value='1'), KeyValue(key='/hall/c'),
                              KeyValue(key='/hall/b', value='b_net.csv:2:1: Baud')]
@@ -111,6 +115,8 @@ def test_bridges_are_heard_and_others_are_not(publish: Publish) -> None:
                 DiagnosticArray(), array('battery', link=OK),
                 array('hall/a', link=OK, mappings=ERROR), down)
         lines = {line.name: line.worst(line.told) for line in watch.lines()}
+        monkeypatch.setattr(watch, 'bridges', lambda: ['/hall/a'])
+        assert watch.is_complete
     assert lines['/hall/a'] == ShownStatus('mappings', Style.BAD, '')
     assert lines['/hall/b'] == ShownStatus('', Style.BAD, 'does not run: b_net.csv:2:1: Baud')
 
@@ -127,7 +133,7 @@ def test_spares_stand_beside_the_line_that_has_an_owner(
         lines = {line.name: line for line in watch.lines()}
         assert lines['/hall/a'].spares == ['beta']
         assert lines['/hall/a'].worst(lines['/hall/a'].told).style is Style.GOOD
-        monkeypatch.setattr(plant, 'SILENCE', 0.3)  # for so long there is no owner
+        monkeypatch.setattr(view, 'SILENCE', 0.3)  # for so long there is no owner
         publish(watch, lambda lines: f'{nobody}beta' in str(lines['/hall/a']), waiting[0])
         later = time.monotonic() + SILENCE
         monkeypatch.setattr(time, 'monotonic', lambda: later)
@@ -146,3 +152,13 @@ def test_nobody_is_heard(capsys: Output, monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr('abdf1_ros.cli.monitor.command.limit_output', lambda: None)
     monkeypatch.setattr(PlantWatch, 'wait', lambda *_: signal.raise_signal(signal.SIGINT))
     assert call(main, capsys, '--all', '--once').status == 0
+
+
+def test_one_picture_waits_for_visible_bridges(
+        capsys: Output, monkeypatch: pytest.MonkeyPatch) -> None:
+    waits = []
+    monkeypatch.setattr(PlantWatch, 'bridges', lambda self: ['/seldom'])
+    monkeypatch.setattr(PlantWatch, 'wait', lambda self, until, seconds: waits.append(
+        (until(), seconds)))
+    call(main, capsys, '--all', '--once', '--wait', '7')
+    assert waits == [(False, 7), (False, 3), (False, 7)]
