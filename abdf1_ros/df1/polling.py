@@ -314,7 +314,8 @@ class StandardPollingMaster:
                     and self._stations.via(packet.dst) in self._listed:
                 self._given[packet.dst] = self._machine.now + self._settings.cmd_timeout
         for number, entry in list(self._outstanding.items()):
-            if not self._stations[number].active:  # it did not accept a message that was passed on
+            if not self._stations[number].active and not entry.is_probe:
+                # It did not accept a message that was passed on.
                 self._end(number, StationInactive(number))
             elif self._machine.now >= entry.deadline \
                     and self._stations.via(number) not in self._polled:
@@ -347,7 +348,8 @@ class StandardPollingMaster:
             task.fail(StationInactive(number))  # it is polled when its turn comes
             return True
         task.sent = True
-        entry = self._outstanding[station] = Outstanding(task)
+        entry = self._outstanding[station] = Outstanding(
+            task, is_probe=not self._stations[station].active)
         now = self._machine.now
         try:
             begun = yield from self._line.deliver(

@@ -63,13 +63,14 @@ class Outstanding:
 
     ``deadline`` is when the reply is overdue (clock value in s), counted from the delivery
     (``is_delivered``). Before the delivery, its value depends on the kind of link. ``passed_over``
-    counts other messages that came in place of the reply.
+    counts other messages that came in place of the reply. ``is_probe``: its station was inactive.
     """
 
     task: Task
     deadline: float = math.inf
     is_delivered: bool = False
     passed_over: int = 0
+    is_probe: bool = False
 
 
 class TaskSource(Protocol):

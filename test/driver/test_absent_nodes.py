@@ -31,7 +31,7 @@ import pytest
 from support.cases import long_unless
 from support.driver_bench import DriverBench
 from support.mappings import make_mapping
-from support.odd_device import Answer, OddDevice, Wiring
+from support.odd_device import Answer, EOT, OddDevice, Wiring
 
 GATEWAY, LIVING, SECONDS, TIMEOUT = 8, 1, 20.0, 0.3
 ABSENT = (11, 12, 13)
@@ -129,9 +129,12 @@ def test_node_that_comes_back_is_read_again(polling: str, answer: Answer) -> Non
     plant = Plant(polling, answer, ABSENT[:1])
     plant.device.takes = lambda data: Answer.ACK
     plant.device.nodes = frozenset((LIVING, *ABSENT))
+    plant.device.say = lambda data: EOT if data[:4] == b'\x10\x02\x05\x0B' \
+        and plant.clock() < SECONDS + 0.5 else data  # the node takes its time at first
     plant.run(3.0)  # seven Timeouts after the last probe at most
     assert plant.listener.changes == [(11, False), (11, True)]
     assert plant.silent == set()
+    assert plant.driver.counters.stale_messages == 0  # the reply to the first probe is taken
 
 
 @pytest.mark.parametrize('polling, answer', long_unless(
