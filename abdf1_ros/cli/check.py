@@ -228,11 +228,12 @@ def _folder(options: argparse.Namespace) -> tuple[str, bool]:
     lines, others = pairs(Path(options.net))
     for name, net, map_file in lines:
         found = examine(str(net), str(map_file), options.default_period / 1000)
+        # If the net file has no port, a parameter gives it.
         if found.network is not None and found.network.com_port != Network().com_port:
-            port = found.network.port  # if the net file has no port, a parameter gives it
-            owner = owners.setdefault(line_of(port), name)
-            if owner != name:
-                found.problems.append(Problem(str(net), f'{port} is the port of {owner} too'))
+            for port in found.network.ports:
+                owner = owners.setdefault(line_of(port), name)
+                if owner != name:
+                    found.problems.append(Problem(str(net), f'{port} is the port of {owner} too'))
         report = _report(found, options)
         bad += bool(found.problems)
         warned += not found.problems and report is not None and bool(report.remarks())
@@ -343,7 +344,7 @@ def _line_text(report: Report) -> str:
 
 def _listening_text(report: Report) -> str:
     network, count = report.network, len(report.mappings)
-    ports = ' and '.join(filter(None, (network.port, network.second_port)))
+    ports = ' and '.join(network.ports)
     return (f'{printable(ports)}: Mode Listen, {network.baud} baud, {network.data_bits} data '
             f'bits, parity {network.parity}, {network.stop_bits} stop, {network.error_code}; '
             f'nothing is sent\n{counted(count, "row")} to be filled from the reads of another '

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from abdf1_ros.df1.machine import character_time
@@ -55,6 +55,12 @@ class PortSettings:
         return cls(name or network.port, network.baud, network.data_bits, network.parity,
                    network.stop_bits, network.handshake, low_latency, rs485,
                    network.line_mode.only_listens, network.second_port)
+
+    @property
+    def each(self) -> tuple[PortSettings, ...]:
+        """Return the settings of each port of the line."""
+        names = (self.name, self.second) if self.second else (self.name,)
+        return tuple(replace(self, name=name, second='') for name in names)
 
     @property
     def char_time(self) -> float:

@@ -215,7 +215,12 @@ class Network:
     @property
     def second_port(self) -> str:
         """Return the device path that Listen_Port means, empty for none."""
-        return _device(self.listen_port)
+        return _device(self.listen_port) if self.line_mode.only_listens else ''
+
+    @property
+    def ports(self) -> tuple[str, ...]:
+        """Return the port of the line, and the second port if there is one."""
+        return (self.port, self.second_port) if self.second_port else (self.port,)
 
     @property
     def timing(self) -> LineTiming:

@@ -342,6 +342,8 @@ def test_two_lines_of_a_folder_on_one_port_are_an_error(tmp_path: Path, capsys: 
                        ('press', 'rfc2217://127.1:4001')):
         write_csv(tmp_path / f'{name}_net.csv', NET_HEADER, [f'{GOOD_NET[:-1]}{port}'])
         write_csv(tmp_path / f'{name}_map.csv', MAP_HEADER, [GOOD_ROW.replace('1000', '10')])
+    write_csv(tmp_path / 'tap_net.csv', 'Mode,Com_Port,Listen_Port', ['Listen,7,/dev/ttyUSB0'])
+    write_csv(tmp_path / 'tap_map.csv', MAP_HEADER, [GOOD_ROW])
     assert main([str(tmp_path)]) == 2
     times = 'poll cycle 74 ms, load 742%, 2 warnings'
     assert capsys.readouterr().out.splitlines() == [
@@ -349,7 +351,9 @@ def test_two_lines_of_a_folder_on_one_port_are_an_error(tmp_path: Path, capsys: 
         f'paint: 1 row, port socket://localhost:4001, {times}',
         f'press: error: {tmp_path}/press_net.csv: rfc2217://127.1:4001 is the port of paint too',
         f'press: 1 row, port rfc2217://127.1:4001, {times}',
-        '3 lines: 2 good (2 of them with warnings), 1 with errors']
+        f'tap: error: {tmp_path}/tap_net.csv: /dev/ttyUSB0 is the port of glue too',
+        'tap: 1 row, port /dev/ttyS6, nothing is sent',
+        '4 lines: 2 good (2 of them with warnings), 2 with errors']
 
 
 def test_json_of_a_folder(tmp_path: Path, capsys: Output) -> None:

@@ -415,18 +415,22 @@ def configured(*rows: Any, port: str = '/dev/ttyS0', **network: Any) -> Configur
         Parameters(map_file='map.csv'), Network(**network), port, Rows(rows), [], {})
 
 
+def heard(first: str, second: str) -> Configuration:
+    return configured(ROW, port=first, mode='Listen', listen_port=second)
+
+
 def refusal(before: Configuration, after: Configuration, *, is_open: bool = True,
             reason: str = '') -> tuple[str, list[str]]:
     """Return the text of a refusal, empty where there is none, and which ports were tried."""
     tried = []
 
     def judge(settings: PortSettings) -> str:
+        assert not settings.second, 'each port is tried alone'
         tried.append(settings.name)
         return reason
 
-    settings = PortSettings(after.port)
     try:
-        refuse_harm(before, after, is_open, settings, judge)
+        refuse_harm(before, after, is_open, PortSettings.of(after.network, after.port), judge)
     except ConfigurationError as error:
         return str(error), tried
     return '', tried
@@ -441,8 +445,9 @@ def test_map_without_rows_would_end_all_topics() -> None:
 
 
 def test_line_holds_its_ports_and_the_places_of_its_guests() -> None:
-    line = configured(share='pty:/a tcp:5000', listen_port='/dev/ttyS1')
-    assert line.held == ('/dev/ttyS0', 'pty:/a', 'tcp:5000', '/dev/ttyS1')
+    assert configured(share='pty:/a tcp:5000').held == ('/dev/ttyS0', 'pty:/a', 'tcp:5000')
+    assert configured(listen_port='2').held == ('/dev/ttyS0',), 'it has no effect'
+    assert heard('/dev/ttyS0', '2').held == ('/dev/ttyS0', '/dev/ttyS1')
 
 
 def test_only_another_device_is_tried_and_only_by_a_line_that_runs() -> None:
@@ -453,6 +458,11 @@ def test_only_another_device_is_tried_and_only_by_a_line_that_runs() -> None:
     assert refusal(here, there) == ('', ['/dev/ttyS77'])
     assert refusal(here, here, reason=reason) == ('', [])
     assert refusal(here, there, is_open=False, reason=reason) == ('', [])
+    pair = heard('/dev/ttyS0', '/dev/ttyS1')
+    assert refusal(pair, heard('/dev/ttyS0', '/dev/ttyS77'), reason=reason) == (
+        f'port: /dev/ttyS77 cannot be opened: {reason}', ['/dev/ttyS77'])
+    assert refusal(pair, heard('/dev/ttyS77', '/dev/ttyS1')) == ('', ['/dev/ttyS77'])
+    assert refusal(pair, heard('/dev/ttyS1', '/dev/ttyS0'), reason=reason) == ('', [])
 
 
 def test_other_name_of_the_same_device_is_not_tried(tmp_path: Path) -> None:

@@ -33,15 +33,17 @@ def refuse_harm(before: Configuration, after: Configuration, is_open: bool,
     """
     Raise ConfigurationError for valid files that would stop a running line.
 
-    ``settings``: of the new port. If the old port ``is_open`` and the new port is another device,
-    that device is opened as a trial.
+    ``settings``: of the new port. If the line ``is_open``, each device that it does not hold yet
+    is opened as a trial.
     """
     problems = []
     if before.mappings and not after.mappings and not after.network.share:
         problems.append(Problem(after.parameters.map_file, (
             'it has no row, so all topics would end; only a line with Share may have no row')))
-    if is_open and line_of(after.port) != line_of(before.port) and (reason := judge(settings)):
-        problems.append(Problem('port', f'{after.port} cannot be opened: {reason}'))
+    held = {line_of(name) for name in before.held}
+    for port in settings.each if is_open else ():
+        if line_of(port.name) not in held and (reason := judge(port)):
+            problems.append(Problem('port', f'{port.name} cannot be opened: {reason}'))
     if problems:
         raise ConfigurationError(problems)
 

@@ -163,8 +163,7 @@ class Configuration:
     @property
     def held(self) -> tuple[str, ...]:
         """Return the ports and the places of Share: no other line may use them."""
-        second = self.network.second_port
-        return self.port, *self.network.share.split(), *([second] if second else [])
+        return self.port, *self.network.share.split(), *self.network.ports[1:]
 
     def driver_settings(self) -> DriverSettings:
         """Return the driver's settings: parameters of equal name, or derived from parameters."""
