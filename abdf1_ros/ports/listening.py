@@ -75,7 +75,8 @@ class TwoPorts(_SilentPort):
         if wake != self._wake:
             self._poll.register(wake, select.POLLIN)
             self._wake = wake
-        milliseconds = None if timeout is None else math.ceil(timeout * 1000)
+        longest = min(self._first.look(), self._second.look())
+        milliseconds = math.ceil(min(longest, longest if timeout is None else timeout) * 1000)
         ready = {port.fileno() for port in (self._first, self._second) if port.has_pieces} or {
             descriptor for descriptor, _ in self._poll.poll(milliseconds)}
         if self._first.fileno() in ready and (data := self._first.read(0, wake)):

@@ -177,12 +177,21 @@ class SerialDevice(DescriptorPort):
         except (OSError, termios.error):  # the device is gone; the next read or write reports it
             return []
 
-    def write(self, data: bytes) -> None:
-        """Send; raise OSError if another program has changed the settings, so we open again."""
-        if (now := time.monotonic()) >= self._next_look:
+    def look(self) -> float:
+        """
+        Check the settings if a check is due; return the seconds until the next check.
+
+        Raises OSError if another program has changed the settings, so that we open the port again.
+        """
+        now = time.monotonic()
+        if now >= self._next_look:
             self._next_look = now + SETTINGS_LOOK
             if self._current_settings() not in ([], self._settings):
                 raise OSError('another program has changed the settings of the port')
+        return self._next_look - now
+
+    def write(self, data: bytes) -> None:
+        self.look()
         super().write(data)
 
     @property
@@ -191,9 +200,11 @@ class SerialDevice(DescriptorPort):
         return bool(self._pieces)
 
     def read(self, timeout: float | None, wake: int) -> bytes:
+        """Wait at most until the next look at the settings: a line may be silent for hours."""
+        longest = self.look()
         if self._pieces:
             return self._pieces.popleft()
-        data = super().read(timeout, wake)
+        data = super().read(longest if timeout is None else min(timeout, longest), wake)
         if not self._is_marked or (not self._held and _MARK not in data):
             return data
         self._divide(self._held + data)

@@ -25,7 +25,7 @@ from typing import Any
 
 from abdf1_ros.df1.frames import Damaged
 from abdf1_ros.df1.listen import SecondPort
-from abdf1_ros.ports import listening
+from abdf1_ros.ports import listening, serial_device
 from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.serial_device import SerialDevice
@@ -133,6 +133,23 @@ def test_two_ports_are_told_apart(ptys: list[Pty], pipe: tuple[int, int]) -> Non
     os.write(end, b'!')
     assert port.read(None, wake) == b''
     port.close()
+
+
+@pytest.mark.parametrize('count', [1, 2])
+def test_changed_speed_is_noticed_on_a_line_where_nobody_writes(
+        ptys: list[Pty], wake: int, count: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(serial_device, 'SETTINGS_LOOK', 0.1)
+    port = open_port(listening_to(*ptys[:count], baud=19200))
+    assert port.read(0, wake) == b''
+    theirs = os.open(ptys[count - 1].name, os.O_RDWR | os.O_NOCTTY)
+    attributes = termios.tcgetattr(theirs)
+    attributes[4:6] = termios.B9600, termios.B9600  # as "stty 9600" does
+    termios.tcsetattr(theirs, termios.TCSANOW, attributes)
+    with pytest.raises(OSError, match='another program has changed the settings of the port'):
+        for _ in range(2):
+            assert port.read(5.0, wake) == b''
+    port.close()
+    os.close(theirs)
 
 
 def test_both_ports_are_for_one_program(ptys: list[Pty]) -> None:
