@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 import os
 from pathlib import Path
@@ -36,6 +37,8 @@ from abdf1_ros.ports.settings import PortSettings
 _PTYS = '/dev/pts/'
 
 _GLANCE = 0.2  # s; longest wait for a client in ``open``
+
+_PAUSE = 50  # ms between two reads of a wire that no program has opened
 
 # A client that has sent nothing for this time (s) loses its place to the next client.
 _SILENT = 30.0
@@ -96,6 +99,12 @@ class PtyEndpoint:
         descriptor = os.dup(self._ours)
         return DescriptorPort(descriptor, lambda: os.close(descriptor))
 
+    def drop_unread(self) -> None:
+        """Drop the bytes that no program has read."""
+        theirs = os.open(self._target, os.O_RDWR | os.O_NOCTTY)
+        termios.tcflush(theirs, termios.TCIFLUSH)
+        os.close(theirs)
+
     def close(self) -> None:
         """Remove the pseudo-terminal and its name."""
         if self._link and _target_of(self._link) == self._target:
@@ -136,9 +145,46 @@ class PtyPlace(PtyEndpoint):
     def _forget(self) -> None:
         """Drop the bytes of both directions."""
         termios.tcflush(self._ours, termios.TCIFLUSH)
-        theirs = os.open(self._target, os.O_RDWR | os.O_NOCTTY)
-        termios.tcflush(theirs, termios.TCIFLUSH)
-        os.close(theirs)
+        self.drop_unread()
+
+
+class PtyWire(PtyEndpoint):
+    """A pseudo-terminal as a wire: bytes that no program takes are lost."""
+
+    def __init__(self, link: str | None) -> None:
+        super().__init__(link)
+        os.close(self._ends.pop())  # so that a read shows when no program has opened the far end
+
+    def open(self) -> Port:  # noqa: A003
+        """Return our end, which stays open while programs come and go."""
+        descriptor = os.dup(self._ours)
+        return _WirePort(descriptor, lambda: os.close(descriptor), self.drop_unread)
+
+
+class _WirePort(DescriptorPort):
+    """Our end of a wire; ``drop`` drops the bytes that a program has not read before its end."""
+
+    def __init__(self, descriptor: int, close: Callable[[], None],
+                 drop: Callable[[], None]) -> None:
+        super().__init__(descriptor, close)
+        self._drop = drop
+        self._hangs_up = select.poll()
+        self._hangs_up.register(descriptor, 0)
+
+    def read(self, timeout: float | None, wake: int) -> bytes:
+        try:
+            return super().read(timeout, wake)
+        except OSError:  # no program has opened the far end
+            self._drop()
+        pause = select.poll()
+        pause.register(wake, select.POLLIN)
+        pause.poll(_PAUSE if timeout is None else min(timeout * 1000, _PAUSE))
+        return b''
+
+    def write(self, data: bytes) -> None:
+        with suppress(BlockingIOError):
+            if not self._hangs_up.poll(0):
+                os.write(self._descriptor, data)
 
 
 def _own(link: Path) -> socket.socket:

@@ -24,7 +24,7 @@ import threading
 import time
 
 from abdf1_ros.ports.descriptor import Port
-from abdf1_ros.ports.endpoints import Endpoint, PtyEndpoint, SerialEndpoint
+from abdf1_ros.ports.endpoints import Endpoint, PtyWire, SerialEndpoint
 from abdf1_ros.ports.opening import name_port
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.wake import Wake
@@ -155,7 +155,7 @@ class Tap:
 
     def _line(self, name: str) -> Endpoint:
         if is_pty(name):
-            return PtyEndpoint(name.partition(':')[2] or None)
+            return PtyWire(name.partition(':')[2] or None)
         try:
             return SerialEndpoint(replace(self._settings, name=name))
         except OSError as error:

@@ -22,7 +22,7 @@ import time
 
 from abdf1_ros.ports import endpoints
 from abdf1_ros.ports.descriptor import DescriptorPort, NoClient
-from abdf1_ros.ports.endpoints import PtyEndpoint, PtyPlace, SerialEndpoint, TcpEndpoint
+from abdf1_ros.ports.endpoints import PtyEndpoint, PtyPlace, PtyWire, SerialEndpoint, TcpEndpoint
 from abdf1_ros.ports.link_thread import Port
 from abdf1_ros.ports.settings import PortSettings
 import pytest
@@ -82,6 +82,20 @@ def test_place_has_nothing_of_the_program_before(tmp_path: Path, wake: int) -> N
             with pytest.raises(NoClient):
                 line.open()
     assert not os.path.lexists(name)
+
+
+def test_wire_loses_what_no_program_takes(tmp_path: Path, wake: int) -> None:
+    name = str(tmp_path / 'plc')
+    with closing(PtyWire(name)) as line, closing(line.open()) as port:
+        for _ in range(2):
+            port.write(bytes(100_000))
+            assert port.read(0.0, wake) == b''
+            client = os.open(name, os.O_RDWR | os.O_NOCTTY)
+            exchange(port, client, wake)
+            port.write(bytes(100_000))  # it does not read
+            os.write(client, b'last')
+            os.close(client)
+            assert port.read(PATIENCE, wake) == b'last'
 
 
 def test_name_of_an_earlier_pty_is_taken_over(tmp_path: Path) -> None:
