@@ -38,8 +38,15 @@ def device_of(path: str) -> str:
     try:
         status = Path(path).stat()
     except OSError:
-        return str(Path(path).resolve())
-    return number_of(status) or str(Path(path).resolve())
+        return _resolved(Path(path))
+    return number_of(status) or _resolved(Path(path))
+
+
+def _resolved(path: Path) -> str:
+    try:
+        return str(path.resolve())
+    except RuntimeError:  # before Python 3.13: the path leads to itself
+        return str(path.absolute())
 
 
 def number_of(status: Any) -> str:
@@ -52,7 +59,7 @@ def number_of(status: Any) -> str:
 
 def link_of(path: str) -> str:
     """Return one text for all ways to write the name of a link; the link is not followed."""
-    return str(Path(path).parent.resolve() / Path(path).name)
+    return str(Path(_resolved(Path(path).parent), Path(path).name))
 
 
 def host_and_port(text: str, default: str = LOOPBACK) -> tuple[str, int]:

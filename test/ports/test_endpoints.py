@@ -121,16 +121,18 @@ def test_link_that_has_been_replaced_stays_at_the_end(tmp_path: Path) -> None:
 @pytest.mark.parametrize('kind', [PtyEndpoint, PtyPlace])
 @pytest.mark.parametrize('link, text', [
     ('taken', 'taken exists already'), ('adapter', 'adapter exists already'),
-    ('none/plc', 'none/plc cannot be made: No such file')])
+    ('none/plc', 'none/plc cannot be made: No such file'),
+    ('loop/plc', 'loop/plc cannot be made: Too many levels')])
 def test_name_that_cannot_be_had_leaves_no_terminal_open(
         tmp_path: Path, kind: type[PtyEndpoint], link: str, text: str) -> None:
     (tmp_path / 'taken').touch()
     (tmp_path / 'adapter').symlink_to('/dev/ttyUSB0')
+    (tmp_path / 'loop').symlink_to('loop')
     before = open_files()
     with pytest.raises(OSError, match=text):
         kind(str(tmp_path / link))
     assert not open_files() - before
-    assert sorted(os.listdir(tmp_path)) == ['adapter', 'taken']
+    assert sorted(os.listdir(tmp_path)) == ['adapter', 'loop', 'taken']
 
 
 def test_link_is_one_however_it_is_written(tmp_path: Path) -> None:

@@ -228,6 +228,8 @@ def test_device_is_known_by_its_number(tmp_path: Path) -> None:
 def test_port_that_is_not_there_is_known_by_its_path(tmp_path: Path) -> None:
     (tmp_path / 'link').symlink_to('nothing')
     assert line_of(str(tmp_path / 'link')) == line_of(str(tmp_path / 'nothing'))
+    (tmp_path / 'loop').symlink_to('loop')
+    assert line_of(str(tmp_path / 'loop')) == str(tmp_path / 'loop')
     assert line_of('socket://host:99999'[:-1]) == 'host:9999'
 
 

@@ -21,7 +21,6 @@ from collections.abc import Mapping as MappingType
 from dataclasses import dataclass, field, fields, replace
 import difflib
 import os
-from pathlib import Path
 import random
 from typing import TypeVar
 
@@ -301,7 +300,7 @@ def _needed(name: str, path: str, problems: list[Problem]) -> str:
 
 
 def _resolved(path: str) -> str:
-    return str(Path(path).resolve()) if path else ''
+    return os.path.realpath(path) if path else ''
 
 
 def wrong_names(node: Node, given: Given, arguments: Arguments, known: Collection[str],
