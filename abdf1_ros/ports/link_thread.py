@@ -362,7 +362,8 @@ class LinkThread(threading.Thread):
 
     def _take_portion(self, data: bytes, now: float) -> bytes:
         """Work on some of the bytes that come too fast, then rest; return the bytes left."""
-        machine, portion = self._machine, data[:_PORTION]
+        machine = self._machine
+        portion = data if len(data) <= _PORTION else data[:_PORTION]  # data may be ``Damaged``
         if portion:
             machine.receive_data(portion, now)
         # There is no portion if all bytes read were commands of a device server.

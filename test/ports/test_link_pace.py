@@ -23,7 +23,7 @@ import time
 from unittest.mock import Mock
 
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import ACK, Frame, message_frame
+from abdf1_ros.df1.frames import ACK, Damaged, Frame, FrameFault, message_frame
 from abdf1_ros.df1.machine import LineTiming, Listen, Machine, Rest, Send
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.ports.descriptor import DescriptorPort, READ_SIZE
@@ -281,6 +281,16 @@ def test_connection_that_babbles_does_not_keep_a_request_from_the_machine() -> N
                      on_state=lambda state: thread.wake())  # as soon as the port is open
     thread.run_out()
     assert script.next() is None
+
+
+def test_damaged_character_of_a_burst_stays_damaged() -> None:
+    script, port = Script(Listen(None)), Babbler(b'', 0)
+    frame = message_frame(Packet(1, 5, 0x0F, 0, 7).encode(), Checksum.CRC)
+    port.read = Mock(side_effect=[  # type: ignore[method-assign]
+        frame[:4], Damaged(frame[4:5]), frame[5:], OSError('the end')])
+    Restful(script, port).run_out()
+    assert isinstance(message := script.next(), Frame)
+    assert message.fault is FrameFault.BAD_CHECK
 
 
 def test_bytes_may_have_come_since_an_attempt_to_open_began() -> None:
