@@ -14,6 +14,7 @@
 
 """Reads that calls ask for, on a virtual line: at once, answered once, and no row starves."""
 
+from dataclasses import replace
 from functools import partial
 import math
 
@@ -38,13 +39,15 @@ RECIPE = make_mapping('N7:0', length=10, is_on_demand=True)
 TABLE = make_mapping('N9:0', length=300, is_on_demand=True)  # three packets
 SPEED = make_mapping('N12:0', period=5000, scaling=Scaling(2.0, 1.0))
 INACTIVE = '2509'
+NETWORK = Network(baud=19200, timeout=200)
 
 
 class Line(DriverBench):
     """A driver of some rows and a PLC-5; ``answers`` have all, with the time they came."""
 
-    def __init__(self, *rows: Mapping, run: float = 1.0, **settings: float) -> None:
-        super().__init__(rows, network=Network(baud=19200, timeout=200), settings=DriverSettings(
+    def __init__(self, *rows: Mapping, run: float = 1.0, network: Network = NETWORK,
+                 **settings: float) -> None:
+        super().__init__(rows, network=network, settings=DriverSettings(
             processor_period=0.0, **settings))  # type: ignore[arg-type]
         self.answers: list[tuple[float, Mapping, ReadAnswer]] = []
         self.there = self.plc(1, 'PLC5', ('N7:0', 500), ('N9:0', 400), ('N12:0', 50))
@@ -158,10 +161,16 @@ def test_calls_do_not_starve_a_full_line(period: int) -> None:
     assert {*line.errors} == {''} and len(line.answers) > 5
 
 
-def test_full_line_answers_a_call_soon() -> None:
+@pytest.mark.parametrize('network', [
+    NETWORK, replace(NETWORK, polling='Standard'),
+    replace(NETWORK, mode='Radio', collision_avoidance=True)])
+def test_full_line_answers_a_call_soon(network: Network) -> None:
+    """A turn in which the station is busy with another command costs a call nothing."""
     rows = [make_mapping(f'N7:{number * 100}', length=60, period=10, tag=f'r{number}')
             for number in range(5)]
-    line = Line(*rows, SPEED, run=10.0)
+    line = Line(*rows, SPEED, network=network)
+    line.there.faults.slow = 6  # polls get EOT
+    line.run(9.0)
     for _ in range(20):
         begun = line.clock()
         line.ask(SPEED, run=1.0)

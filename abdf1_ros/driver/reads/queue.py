@@ -66,6 +66,7 @@ class ReadQueue:
         self._wanted_from = -math.inf  # until then other due reads go first (clock value in s)
         self._tickets = itertools.count(1)
         self._turn = 0
+        self._before_turn = self._turn, self._wanted_from
 
     def __bool__(self) -> bool:
         """Tell whether a job waits, due or not."""
@@ -104,15 +105,20 @@ class ReadQueue:
     def take(self, now: float) -> ReadJob | None:
         """Remove and return the job that goes next, None where none is due."""
         heap = self._next_heap(now)
-        self._turn = (self._turn + 1) % _TURNS
         if heap is None:
             return None
         job = heapq.heappop(heap)[2]
         job.ticket = 0
+        self._before_turn = self._turn, self._wanted_from
+        self._turn = (self._turn + 1) % _TURNS
         if heap is self._wanted:
             packet = block_time(job.block) / len(job.block.requests)
             self._wanted_from = now + (1 + _OTHERS_BESIDE_WANTED) * packet
         return job
+
+    def undo_turn(self) -> None:
+        """Let the job that was taken last not count: it does not go on the line now."""
+        self._turn, self._wanted_from = self._before_turn
 
     def first(self, now: float) -> ReadJob | None:
         """Return the job that goes next, None where none is due."""

@@ -100,13 +100,15 @@ class Reads(WriteListener):
                 return job
         passed_over = []
         while (job := self.queue.take(now)) is not None:
-            if not self._stations.records[job.station].replies_in_time:
-                self._set_aside(job)
-            elif job.station in busy:
-                passed_over.append(job)
-            else:
+            replies_in_time = self._stations.records[job.station].replies_in_time
+            if replies_in_time and job.station not in busy:
                 job.is_probe = False
                 break
+            self.queue.undo_turn()
+            if replies_in_time:
+                passed_over.append(job)
+            else:
+                self._set_aside(job)
         for other in passed_over:
             self.queue.put(other, other.due)
         return job
@@ -124,6 +126,7 @@ class Reads(WriteListener):
             if is_proven and job.station not in busy:
                 job.is_probe = False
                 break
+            self.queue.undo_turn()
             is_kept_waiting |= is_proven
             passed_over.append(job)
         for other in passed_over:
@@ -155,6 +158,7 @@ class Reads(WriteListener):
             if self._stations[job.station].replies_in_time:
                 return True
             self.queue.take(now)
+            self.queue.undo_turn()
             self._set_aside(job)
         return False
 
