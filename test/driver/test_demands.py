@@ -98,6 +98,14 @@ def test_row_that_was_asked_for_keeps_its_period_afterwards() -> None:
     for seconds in (0.5, 4.0):  # it is published at once, and not again
         line.ask(SPEED, run=seconds) if seconds < 1 else line.run(seconds)
         assert len(line.listener.values(SPEED)) - before == 1
+    line.there.faults.silent = True
+    line.ask(SPEED, run=10.0)
+    assert line.errors[-1][:4] == INACTIVE
+    line.there.faults.silent = False
+    line.run(10.0)
+    before = len(line.listener.values(SPEED))
+    line.run(10.0)
+    assert len(line.listener.values(SPEED)) - before == 2
 
 
 def test_answer_is_never_older_than_the_call() -> None:

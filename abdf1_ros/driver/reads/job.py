@@ -79,7 +79,8 @@ class ReadJob(Job):
     - ``due``: when the block is due.
     - ``refreshed``: when a write last changed words of the block; minus infinity after a later
       read.
-    - ``wanted``: when a call last asked for the block; minus infinity when no call waits for it.
+    - ``wanted``: when a call last asked for the block; minus infinity after a read if no call
+      waits for another one.
     - ``started``: when the read under way, or the last one, began.
     - ``asked``: when its last packet was sent.
     - ``longest_read``: seconds within which all packets of a read have to come.

@@ -168,7 +168,7 @@ class Readings:
             elif isinstance(error, FormatError):
                 self._failed(job, f'unusable reply: {error}', is_refusal=False)
         finally:
-            if self.demands.waiting:
+            if self.demands.waiting or job.wanted > -math.inf:
                 self._settle(job, words, error)
             self.reads.ended(job, self._line.now)
 
