@@ -45,10 +45,13 @@ class Bench(DriverBench):
     def __init__(self, polling: str = 'Message', **settings: float) -> None:
         self.first = make_mapping('N7:0', station=FIRST, via=GATEWAY, length=2)
         self.second = make_mapping('N7:0', 'ReadWrite', station=SECOND, via=GATEWAY, plc='SLC')
+        self.recipe = make_mapping('N7:5', station=SECOND, via=GATEWAY, plc='SLC',
+                                   is_on_demand=True)
         self.third = make_mapping('N7:0', station=DIRECT)
         network = Network(baud=POLLING[polling], timeout=100, cmd_timeout=500, polling=polling)
-        super().__init__([self.first, self.second, self.third], network=network,
-                         settings=DriverSettings(**settings), start=False)  # type: ignore
+        rows = [self.first, self.second, self.recipe, self.third]
+        super().__init__(rows, network=network, settings=DriverSettings(
+            **settings), start=False)  # type: ignore
         self.plcs = [simulated_plc(FIRST, 'PLC5', self.clock, ('N7:0', 10)),
                      simulated_plc(SECOND, 'SLC', self.clock, ('N7:0', 10))]
         self.gateway = SimulatedGateway(GATEWAY, self.plcs, Checksum.CRC)
@@ -105,6 +108,7 @@ def test_plc_that_the_gateway_does_not_reach_costs_the_other_nothing(polling: st
     bench.plcs[1].faults.silent = True
     bench.run(2.0)
     assert bench.listener.values(bench.second) == []
+    assert bench.driver.points[bench.recipe].error is None  # no call has asked for it
     assert [address for address, _ in bench.listener.reasons] == ['N7:0']
     assert 'STS 02' in bench.listener.reasons[0][1]
     assert len(bench.listener.values(bench.first)) >= 16

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from collections.abc import Mapping as MappingType
 import math
 from typing import Protocol
@@ -158,8 +158,7 @@ class Readings:
             if words is not None:
                 self._read(job, words)
             elif isinstance(error, ReadTooOld):
-                for point in job.points:
-                    point.fail(f'read again: {error}')
+                _fail_periodic(job.points, f'read again: {error}')
             elif isinstance(error, LinkError):
                 self.link_failed(job.station, error, job.points)
             elif isinstance(error, RemoteError):
@@ -286,18 +285,21 @@ class Readings:
             self._change(self._refusals.processor_told(station, identity.processor, self.blocks))
 
     def link_failed(self, station: int, error: LinkError,
-                    points: Iterable[ReadPoint] = ()) -> None:
+                    points: Collection[ReadPoint] = ()) -> None:
         """Fail the points of a transaction without a reply."""
         self._stations[station].failures += 1
-        for point in self._affected(station, points):
-            if not point.mapping.is_on_demand:  # the call gets the error
-                point.fail(str(error))
+        _fail_periodic(self._affected(station, points), str(error))
 
-    def _affected(self, station: int, points: Iterable[ReadPoint]) -> Iterable[ReadPoint]:
-        """Return the points of a failed transaction; for a silent station all its points."""
+    def _affected(self, station: int, points: Collection[ReadPoint]) -> Collection[ReadPoint]:
+        """
+        Return the points of a failed transaction; for a silent station all its points.
+
+        Other rows on demand are not among them: no read would end their fault.
+        """
         if self._stations[station].replies_in_time:
             return points
-        return [point for point in self.points.values() if point.mapping.station == station]
+        return [point for mapping, point in self.points.items() if mapping.station == station
+                and (point in points or not mapping.is_on_demand)]
 
     def station_lost(self, station: int) -> None:
         """Answer all calls for rows of a station that has become inactive."""
@@ -310,9 +312,14 @@ class Readings:
         self.reads.drop([job for job in self.reads.jobs if job.is_on_demand], self._line.now)
         for job in self.reads.jobs:
             job.interrupted()
-        for mapping, point in self.points.items():
-            if mapping.polls and not mapping.is_on_demand:
-                point.fail(reason)
+        _fail_periodic((point for point in self.points.values() if point.mapping.polls), reason)
+
+
+def _fail_periodic(points: Iterable[ReadPoint], reason: str) -> None:
+    """Fail the points that are read periodically: a call gets the reason as its answer."""
+    for point in points:
+        if not point.mapping.is_on_demand:
+            point.fail(reason)
 
 
 def _points(mappings: Rows, blocks: Sequence[Block], settings: DriverSettings, guards: Guards,
