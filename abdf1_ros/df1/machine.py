@@ -211,8 +211,9 @@ class Machine:
     the answer. ``counters`` gets the characters in both directions. ``background`` does its work
     even while the line is busy.
 
-    ``sender`` has the bytes to send. ``late`` is the sum of the seconds by which calls came after
-    a deadline of the procedure. In this time the process, or its host, did not run.
+    ``sender`` has the bytes to send. ``late`` is the sum of the seconds by which calls came more
+    than MOST_LATE after a deadline of the procedure. In this time the process, or its host, did
+    not run.
     """
 
     def __init__(self, procedure: Callable[[Machine], Procedure], *, checksum: Checksum,
@@ -383,9 +384,9 @@ class Machine:
             if has_expired:  # what waited for it may go out now
                 self._end_rest()
             return
-        self.late += now - self.deadline
-        if now - self.deadline > MOST_LATE:
-            self._last_pause = now, now - self.deadline
+        if (seconds := now - self.deadline) > MOST_LATE:
+            self.late += seconds
+            self._last_pause = now, seconds
         step = self._step
         if isinstance(step, Send) and not self._is_listening:  # its delay is over
             self._transmit(step)
