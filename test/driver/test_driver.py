@@ -258,11 +258,15 @@ def test_address_that_the_plc_refuses_takes_down_only_its_own_mapping() -> None:
     assert any(block.mappings == (bad,) for block in bench.driver.readings.blocks)
 
 
-def test_address_that_comes_into_being_is_read_with_its_neighbours_again() -> None:
-    bench = DriverBench([make_mapping(f'N9:{n}', plc='SLC') for n in range(8)])
-    plc = bench.plc(1, 'SLC', ('N9:0', 6))
+@pytest.mark.parametrize(('words', 'beat'), [(6, 8), (7, 6), (7, 7)])
+def test_address_that_comes_into_being_is_read_with_its_neighbours_again(
+        words: int, beat: int) -> None:
+    """A Heartbeat row has no value that fails, yet its word is read like all others."""
+    bench = DriverBench([make_mapping(f'N9:{n}', 'Heartbeat' if n == beat else 'Read', plc='SLC',
+                                      period=200) for n in range(8)])
+    plc = bench.plc(1, 'SLC', ('N9:0', words))
     bench.run(2.0)
-    assert len(bench.driver.readings.blocks) == 3
+    assert len(bench.driver.readings.blocks) == 9 - words
     plc.table.create(parse_address('N9:0', PlcType.SLC), 8)
     bench.run(2.0)
     assert len(bench.driver.readings.blocks) == 1

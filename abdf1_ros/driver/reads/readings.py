@@ -179,10 +179,9 @@ class Readings:
         if self.guards.counters:
             for point, place in job.points.items():
                 self.guards.value_read(point, data[place], now)
-        has_recovered, period = False, job.block.period
+        period = job.block.period
         is_refresh = job.refreshed > -math.inf or job.wanted > -math.inf
         for point, place in job.points.items():
-            has_recovered |= point.error is not None
             # Points without a longer Period than the block are updated by every read.
             is_rare = point.period > period and not is_refresh
             if is_rare and not point.is_due(now, period):
@@ -192,7 +191,9 @@ class Readings:
             else:
                 self._guarded(point, point.guard, data[place], job.started)
         job.done(now)
-        if has_recovered:
+        if job.is_on_demand:
+            return  # other rows are not read with it
+        if job.intervals.last is None:  # the first good read after a failure
             self._change(self._refusals.recovered(job.block, self.blocks))
         elif self._refusals.recovering:
             self._change(self._refusals.read_again(job.block, self.blocks))
