@@ -16,8 +16,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
-
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import RemoteError
 from abdf1_ros.pccc.describe import describe
@@ -33,15 +31,16 @@ _LATELY = 60.0  # s
 
 class RefusedCommands:
     """
-    Refused commands, by a text with station, address and reason.
+    Refused commands, by a text with station, address and reason; the last one is the latest.
 
-    Only the link thread adds commands; any thread may read them.
+    When there are too many, a new one takes the place of the oldest, but not of one that is shown
+    still. Only the link thread adds commands; any thread may read them.
     """
 
     def __init__(self, plc_type: PlcType) -> None:
         self._meanings = FAMILIES[plc_type].meanings
-        self._counts: Counter[str] = Counter()
-        self._last: dict[str, float] = {}  # when each was refused last (clock value in s)
+        # How often each was refused, and when last (clock value in s). Replaced, never changed.
+        self._refused: dict[str, tuple[int, float]] = {}
 
     def add(self, command: Packet, reply: Packet, now: float) -> None:
         """Keep a refused command, without the values that it would have written."""
@@ -49,15 +48,22 @@ class RefusedCommands:
             check_status(reply, self._meanings)
         except RemoteError as error:
             asked = describe(command).partition(' = ')[0]
-            text = f'station {command.src}: {asked}: {error}'
-            if text in self._last or len(self._last) < _MOST:
-                self._counts[text] += 1
-                self._last[text] = now
+            self._keep(f'station {command.src}: {asked}: {error}', now)
+
+    def _keep(self, text: str, now: float) -> None:
+        others = {**self._refused}
+        count, _ = others.pop(text, (0, now))
+        if len(others) == _MOST:
+            oldest = next(iter(others))
+            if oldest in self.lately(now):
+                return
+            del others[oldest]
+        self._refused = {**others, text: (count + 1, now)}
 
     def lately(self, now: float) -> list[str]:
         """Return the commands that were refused within the last minute."""
-        return [text for text, last in [*self._last.items()] if now - last < _LATELY]
+        return [text for text, (_, last) in self._refused.items() if now - last < _LATELY]
 
     def counted(self) -> dict[str, int]:
         """Return how often each command was refused."""
-        return dict(self._counts)
+        return {text: count for text, (count, _) in self._refused.items()}

@@ -422,10 +422,13 @@ def test_other_values_and_later_times_are_the_same_command() -> None:
 
 def test_flood_of_different_commands_is_bounded() -> None:
     refused = RefusedCommands(PlcType.PLC5)
-    for element in (*range(200), 0):
-        refused.add(write(element), write(element).reply(b'\x06', 0xF0), 0.0)
-    assert [*refused.counted().values()] == [2, *7 * [1]]
+    for now, elements in ((0.0, range(200)), (5.0, [0]), (62.0, [99])):
+        for element in elements:
+            refused.add(write(element), write(element).reply(b'\x06', 0xF0), now)
+        assert len(refused.counted()) == 8
+    assert [*refused.counted().values()] == [*6 * [1], 2, 1]
     assert 'STS F0 EXT STS 06' in refused.lately(0.0)[0]
+    assert [text.split(':')[2] for text in refused.lately(62.0)] == ['0', '99']
 
 
 def test_driver_keeps_what_it_refuses() -> None:
