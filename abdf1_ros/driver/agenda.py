@@ -157,10 +157,9 @@ class Agenda:
         """Return the next job: own writes first, not counted as ``writes`` in a row (rule 11)."""
         if self._interlocks.is_ending:  # no value that is read now would be used
             self._own_in_a_row, self._was_silent = 0, False
-        if self._own_in_a_row >= OWN_IN_A_ROW:
+        if self._own_in_a_row >= OWN_IN_A_ROW and (job := self._check_or_read(now, busy)):
             self._own_in_a_row = 0
-            if job := self._check_or_read(now, busy):
-                return job
+            return job
         # Remaining packets of a long fallback go first: heartbeats that are always due would keep
         # them waiting.
         if under_way := self._tasks.first(busy, is_own=True):

@@ -417,11 +417,12 @@ def test_rule_9_write_of_another_row_to_the_same_words_holds_up_for_its_own_time
     assert cell.word('N7:0') == 7
 
 
-def test_rule_11_eighth_turn_is_a_read_where_fallbacks_have_several_packets() -> None:
+@pytest.mark.parametrize('polling', ['Message', 'Standard'])  # here a station is often busy
+def test_rule_11_eighth_turn_is_a_read_where_fallbacks_have_several_packets(polling: str) -> None:
     rows = [speed_row(Fallback((7,) * 200, 2000), f'N2{number}:0', f'w{number}', 200)
             for number in range(5)]
     bench = DriverBench([*rows, make_mapping('N9:0', period=1)], start=False,
-                        network=Network(baud=115200, timeout=200))
+                        network=Network(baud=115200, timeout=200, polling=polling))
     plc = bench.plc(1, 'PLC5', ('N9:0', 1), *((f'N2{number}:0', 200) for number in range(5)))
     said = ''
 
