@@ -164,6 +164,9 @@ def test_faulty_files_change_nothing(bench: Bench, capfd: Output) -> None:
     speeds = bench.ros.listen(Int16MultiArray, '/abdf1/read/speed', EVERYTHING)
     assert values_in(speeds.first()) == [7, 8]
     assert f'{bench.net}:2:1 (Baud): Baud = "9601"' in capfd.readouterr().err
+    bench.write_map(LEVEL)
+    bench.write_net(100)
+    assert bench.reload()[0]  # the old faults are forgotten
 
 
 def test_files_that_would_stop_the_line_change_nothing(bench: Bench) -> None:
