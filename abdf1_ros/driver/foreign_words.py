@@ -48,11 +48,14 @@ class _NotedTable(DataTable):
     """
     The files of some rows, each of unlimited size; writes are noted, and their data dropped.
 
-    ``is_elsewhere`` tells that a command named a file of no row.
+    ``is_elsewhere`` tells that a command named a file of no row. Such a file has the type
+    ``others``; with None there is no such file.
     """
 
-    def __init__(self, plc_type: PlcType, rows: Sequence[Mapping]) -> None:
+    def __init__(self, plc_type: PlcType, rows: Sequence[Mapping],
+                 others: FileType | None = None) -> None:
         super().__init__(plc_type)
+        self._others = others
         self._types = {row.address.file: row.address.file_type for row in rows}
         self.written: list[tuple[Address, int]] = []
         self.is_elsewhere = False
@@ -60,6 +63,8 @@ class _NotedTable(DataTable):
     def file_type(self, file: int) -> FileType:
         """Return the type of a file, or record that no row is in it."""
         self.is_elsewhere = file not in self._types
+        if self.is_elsewhere and self._others is not None:
+            return self._others
         return super().file_type(file)
 
     def find(self, address: Address, words: int) -> tuple[bytearray, int]:
@@ -67,8 +72,9 @@ class _NotedTable(DataTable):
         return bytearray(2 * words), 0
 
     def write(self, address: Address, data: bytes) -> None:
-        """Note which words are written."""
-        self.written.append((address, len(data) // 2))
+        """Note which words of files of rows are written."""
+        if address.file in self._types:
+            self.written.append((address, len(data) // 2))
 
 
 def _uses_common_file(command: Packet, rows: Sequence[Mapping]) -> bool:
@@ -106,7 +112,8 @@ def written_extents(command: Packet, station: int,
         if _uses_common_file(command, there):
             found += [row.extent for row in there if _may_be_common(row)]
             continue
-        table = _NotedTable(plc_type, there)
+        # A command may name files with and without rows.
+        table = _NotedTable(plc_type, there, FileType.INTEGER)
         reply = Server(table).serve(command)
         if reply.sts and not table.is_elsewhere:
             return None

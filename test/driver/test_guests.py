@@ -173,6 +173,9 @@ def test_a_write_of_a_guest_is_read_again_at_once(kind: str, address: str, write
     ('PLC5', '0F 67 00 00 02 00 06 14 03 95 09 42 01 00 02 00', 'N20:3', 2),
     ('PLC5', '0F 67 00 00 01 00 06 08 02 96 09 94 08 00 00 80 3F', 'F8:2', 1),
     ('PLC5', '0F 26 06 14 03 FE FF 01 00', 'N20:3', 1),
+    # And a word of a file of no row, before and after it.
+    ('PLC5', '0F 26 06 15 00 FE FF 01 00 06 14 03 FE FF 01 00', 'N20:3', 1),
+    ('PLC5', '0F 26 06 14 03 FE FF 01 00 06 15 00 FE FF 01 00', 'N20:3', 1),
     ('PLC5', '0F 00 00 00 02 00 06 14 03 01 00 02 00', 'N20:3', 2),
     ('PLC5', '08 06 00 34 12', 'N9:3', 1)])
 def test_words_of_a_write_are_known_by_its_address(entry: tuple[str, str, str, int]) -> None:
