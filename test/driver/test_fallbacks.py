@@ -42,6 +42,7 @@ from support.interlocks import (
     AFTER,
     beat_row,
     Cell,
+    end,
     FALLBACK,
     Line,
     RETURN,
@@ -261,6 +262,20 @@ def test_rule_8_change_to_run_is_a_first_contact(beats: tuple[Mapping, ...]) -> 
     contact = [('N10:0', 0), ('N7:0', 7), ('N10:0', 1)] if beats else [('N7:0', 7)]
     at = after.index(contact[0])
     assert after[at:at + len(contact)] == contact
+
+
+def test_rule_2_message_before_the_last_fallback_makes_no_row_fresh() -> None:
+    speed = speed_row(Fallback((7,), 20_000))
+    cell = Cell(beat_row(), speed, run=1.0)
+    cell.publish(speed, 42, run=0.5)
+    end(cell)
+    store(cell.plc, 'N7:0', [1234])  # by another program, while the port is released
+    cell.bench.driver.interlocks.resume()
+    since = cell.now
+    cell.bench.open(run=1.0)
+    assert cell.word('N7:0') == 7
+    after = [(name, bool(value)) for when, name, value in cell.writes if when >= since]
+    assert after.index(('N7:0', True)) < after.index(('N10:0', True))
 
 
 @for_all('outcome', [Outcome.UNKNOWN, Outcome.PARTLY])

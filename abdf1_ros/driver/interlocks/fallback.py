@@ -133,8 +133,8 @@ class FallbackRow:
         return self.due if may_be else math.inf
 
     def is_fresh(self, now: float) -> bool:
-        """Tell whether the last confirmed message is younger than Fallback_After."""
-        return now < self.refreshed + self.after
+        """Tell whether a message younger than Fallback_After came after the last fallback."""
+        return self.sent < self.refreshed and now < self.refreshed + self.after
 
     def deadline(self, youngest: float) -> float:
         """
