@@ -264,6 +264,15 @@ def test_rule_8_change_to_run_is_a_first_contact(beats: tuple[Mapping, ...]) -> 
     assert after[at:at + len(contact)] == contact
 
 
+def test_rule_8_change_to_run_while_a_fallback_is_under_way_has_it_written_again() -> None:
+    row = (one := OneRow()).row
+    row.make_due(FallbackCause.START, 0.0)
+    write = row.take(1.0)
+    row.make_due(FallbackCause.RUN, 2.0)  # between two packets
+    one.fallback(write, 3.0)
+    assert row.cause is FallbackCause.START and row.judge(3.0, -math.inf)
+
+
 def test_rule_2_message_before_the_last_fallback_makes_no_row_fresh() -> None:
     speed = speed_row(Fallback((7,), 20_000))
     cell = Cell(beat_row(), speed, run=1.0)

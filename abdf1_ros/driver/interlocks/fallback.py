@@ -99,9 +99,14 @@ class FallbackRow:
         return self.state is FallbackState.STANDS
 
     def make_due(self, cause: FallbackCause, now: float) -> None:
-        """Make the fallback due at once; the first cause is reported."""
-        if self.cause is None:
-            self.cause, self._due_since = cause, now
+        """
+        Make the fallback due at once; the first cause is reported.
+
+        A download may have brought back the words of packets that went before a change to RUN. So
+        a fallback that is under way is then written again.
+        """
+        if self.cause is None or self.is_under_way and cause is FallbackCause.RUN:
+            self.cause, self._due_since = self.cause or cause, now
         self._due_since = min(self._due_since, now)  # a message may have set a later time
         self.state = FallbackState.DUE
         self._next_try = self.due = now
