@@ -272,6 +272,8 @@ def test_what_a_node_on_the_way_says_to_a_guest_says_nothing_about_the_station(
     task = CommandTask(Packet(1, 9, 0x0F, 0, 7, b''), lambda: 0.0)
     task.blames = blames
     accounting.complete(task, task.command.reply(sts=0x02), keeps_others_waiting=True)
+    echo = CommandTask(Packet(1, 9, 0x06, 0, 8, b''), lambda: 0.0)  # the node may execute it
+    accounting.complete(echo, echo.command.reply(), keeps_others_waiting=True)
     assert (stations[1].local_status, stations[1].overdue) == ((2, 1) if blames else (0, 0))
 
 
