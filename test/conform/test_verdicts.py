@@ -131,6 +131,7 @@ FAULTS = [(target, habit, name) for targets, habit, name in [
     ((Target.PEER,), Habit.SILENCE_REPEATED, 'enquiry-limit'),
     ((Target.PEER,), Habit.RESPONSE_IS_DATA, 'embedded-response'),
     ((Target.PEER,), Habit.RESPONSE_INSIDE_IGNORED, 'embedded-response'),
+    ((Target.PEER,), Habit.DROPS_MESSAGE_AROUND, 'embedded-response'),
     ((Target.PEER,), Habit.ENQUIRES_ALWAYS, 'no-needless-enquiry'),
     ((Target.PEER, Target.CLIENT), Habit.NEVER_GIVES_UP, 'nak-limit'),
     ((Target.MASTER,), Habit.NO_ACK, 'polled-after-ack'),

@@ -90,6 +90,7 @@ Habit = Enum('Habit', [
     'ENQUIRES_ALWAYS',  # 100 ms after each message
     'ENQ_AFTER_NOISE_OLD',  # DLE ENQ gets the response of before the noise
     'EMBEDDED_NAK_IGNORED', 'EMBEDDED_NAK_AS_ACK', 'ENQUIRES_FOR_EVER',
+    'DROPS_MESSAGE_AROUND',  # the first response inside of one
     'ACK_TIMEOUT_OF_8',  # s
     'REPEATS_AFTER_ACK',  # once, after 2 s
     'USES_REFUSED_REPLY',
@@ -127,6 +128,7 @@ class Wire:
         self._count = count()
         self._next = 0
         self._said = self._embedded = b''
+        self._has_dropped = False
         self._receiver = self._receive()
         next(self._receiver)
 
@@ -239,7 +241,7 @@ class Wire:
             self.take((code,))
 
     def _message(self, station: int | None) -> Generator[None, int, None]:
-        data = bytearray()
+        data, is_dropped = bytearray(), False
         while True:
             byte = yield
             if byte != _DLE:
@@ -254,6 +256,7 @@ class Wire:
                 data += bytes((_DLE, code))
             elif code in (_ACK, _NAK) or code == _ENQ and self.has(Habit.ENQ_IN_MESSAGE_ANSWERED):
                 self._inside(code)
+                is_dropped = self.has(Habit.DROPS_MESSAGE_AROUND) and not self._has_dropped
             elif code != _ENQ or not self.has(Habit.ENQ_IN_MESSAGE_IGNORED):
                 if self.has(Habit.LOST_AFTER_BROKEN_MESSAGE):
                     for _ in range(3):
@@ -263,6 +266,9 @@ class Wire:
                 if code in (_SOH, _STX) or code == _ENQ and self.is_half_duplex:
                     yield from self._control(code)
                 return
+        if is_dropped:
+            self._has_dropped = True
+            return
         yield from self._check(station, bytes(data))
 
     def _inside(self, code: int) -> None:
