@@ -182,9 +182,10 @@ def test_retries_trace_and_log_are_arguments(port: str, tmp_path: Path,
     caplog.set_level('DEBUG', 'abdf1_ros')
     with client_with(port, timeout=0.1, retries=1, trace=trace) as plc:
         plc.read('N7:0')
+        before = plc.counters.nak_retries  # on a busy host
         with pytest.raises(LinkError):
             plc.read('N7:0', station=9)
-        assert plc.counters.nak_retries == 1
+        assert plc.counters.nak_retries == before + 1
     logged = [record.getMessage() for record in caplog.records if record.name == 'abdf1_ros']
     assert {(record.levelname, record.getMessage()[5:8]) for record in caplog.records
             if record.getMessage()[:1] == '2'} == {('DEBUG', 'NTC'), ('INFO', 'ERR')}
