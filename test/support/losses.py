@@ -94,7 +94,7 @@ class Losses:
             return data
         # A full-duplex message that leaves no trace gets the ACK of the one before.
         if is_peer and is_message:
-            return data[:-1] + bytes((data[-1] ^ 1,))
+            return _damaged(data)
         self._loses_rest = True
         return b''
 
@@ -106,6 +106,13 @@ class Losses:
         is_taken, self._takes_answer = self._takes_answer, False
         # A full-duplex reply that comes with the ACK has frames, and losses, of its own.
         return (data[len(ACK):] if data.startswith(ACK) else b'') if is_taken else data
+
+
+def _damaged(data: bytes) -> bytes:
+    """Return a part of a message with one wrong character, which belongs to no symbol."""
+    at = next(at for at in reversed(range(len(data)))
+              if Code.DLE not in (data[at - 1], data[at], data[at] ^ 1))
+    return data[:at] + bytes((data[at] ^ 1,)) + data[at + 1:]
 
 
 class AirLosses(Losses):

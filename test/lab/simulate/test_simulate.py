@@ -35,6 +35,7 @@ from simulate.rules import (
 from simulate.run import simulate, Story
 from simulate.steady import Steady
 from support.devices import DEVICES
+from support.losses import Losses, Lost
 from support.world import GUESTS, MODES, Plant, Said, Sent, STEP, World
 
 
@@ -60,6 +61,13 @@ def test_line_full_of_beats_recovers_one_row_after_another(
     full = Plant('Radio', stations=3, rows=3, after=600, period=500, baud=9600, retries=1)
     monkeypatch.setattr(Plant, 'drawn', lambda dice, mode: full)
     Story(4, turns=1, is_steady=False).run()
+
+
+def test_message_of_a_peer_that_is_damaged_ends_where_it_ended() -> None:
+    losses = Losses(Lost('Peer', lost=1.0, lose_replies=False), lambda: 0.0)
+    losses.is_due = True
+    said = bytes.fromhex('10 02 01 C8 0F 00 42 01 A2 02 0A 89 00 00 10 03')
+    assert losses.hear(said) == said[:-3] + b'\1' + said[-2:]
 
 
 def test_plc_need_not_be_known_that_a_master_still_has_as_inactive() -> None:
