@@ -109,6 +109,8 @@ class Output:
     def __init__(self, options: argparse.Namespace) -> None:
         self._options = options
         self._session: TrafficDecoder | None = None
+        self._line = '', ''  # check and duplex that the session was begun with
+        self._baud = options.baud
         self._summary = Summary(options.baud)
         self._bundle = _bundle(options) if options.report else None
         self._timeline = _timeline(options) if options.html else None
@@ -119,19 +121,33 @@ class Output:
         self._next_progress = time.monotonic() + PROGRESS_PERIOD
 
     def begin(self, settings: dict[str, str]) -> TrafficDecoder:
-        """Return the decoder; without an option, settings come from the head of a capture."""
+        """
+        Return the decoder; without an option, settings come from the head of a capture.
+
+        A capture with another check or duplex is of another line, or of other settings of it: then
+        the traffic so far has ended. With several speeds the load of the line is not known.
+        """
+        options = self._options
+        check, duplex = line = tuple(
+            settings.get(name, '').lower() if chosen == _AUTO else chosen
+            for name, chosen in (('check', options.check), ('duplex', options.duplex)))
+        if self._session is not None and any(line) and settings and line != self._line:
+            self._finish(self._session)
+            self._session = None
         if self._session is None:
-            options, baud = self._options, settings.get('baud', '')
-            check, duplex = (
-                settings.get(name, '').lower() if chosen == _AUTO else chosen
-                for name, chosen in (('check', options.check), ('duplex', options.duplex)))
+            self._line = check, duplex
             # The head of a capture has the settings of the node, which may be wrong.
             self._session = TrafficDecoder(_CHECKS.get(check), _DUPLEX.get(duplex),
                                            is_certain=options.check != _AUTO)
-            speed = whole_number(baud)
-            if self._summary.baud is None and speed and speed > 0:
-                self._summary.baud = speed
+        speed = whole_number(settings.get('baud', ''))
+        if options.baud is None and speed and speed > 0 and speed != self._baud:
+            self._summary.baud = speed if self._baud is None else None
+            self._baud = speed
         return self._session
+
+    def _finish(self, session: TrafficDecoder) -> None:
+        for entry in session.finish():
+            self._print(entry)
 
     def take(self, chunk: Chunk, settings: dict[str, str]) -> None:
         """Print the entries of a chunk."""
@@ -140,7 +156,7 @@ class Output:
             self._packets.begin(settings.get('begun', ''))
         self._summary.take(chunk)
         if self._timeline:
-            self._timeline.take(chunk, self._summary.baud, settings.get('begun', ''))
+            self._timeline.take(chunk, self._baud, settings.get('begun', ''))
         for entry in session.feed(chunk):
             self._print(entry)
 
@@ -157,8 +173,7 @@ class Output:
 
     def end(self) -> None:
         """Print the remaining entries, then the summary."""
-        for entry in self.begin({}).finish():
-            self._print(entry)
+        self._finish(self.begin({}))
         if self._packets:
             self._packets.close()
         self.sum_up()

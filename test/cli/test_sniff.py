@@ -41,6 +41,7 @@ from support.commands import Output, running_simulator
 from support.forked import Forked
 from support.ptys import full_pipe, no_file_longer_than, PATIENCE, Pty, read_exactly, wait_until
 from support.ros import Process
+from support.vectors import VECTOR_FOLDER
 
 COMMAND = Packet(2, 5, 0x0F, 0, 0x1234, bytes.fromhex('A2 04 07 89 00 00'))
 REPLY = COMMAND.reply(bytes.fromhex('34 12 FE FF'))
@@ -121,6 +122,23 @@ def test_summary_alone_shows_the_load_at_a_baud_rate(capsys: Output, capture: st
 def test_files_one_after_the_other(capsys: Output, capture: str) -> None:
     assert lines_of(capsys, '--summary', capture, capture)[1] == \
         '  seen: 2 commands, 2 replies, 2 polls, 4 ACK'
+
+
+def test_capture_with_other_settings_is_of_another_line(capsys: Output, tmp_path: Path) -> None:
+    """As after a change of net.csv: a start of the node renames the trace to ``.1``."""
+    paths = []
+    for duplex, baud, name in (('full', 19200, ''), ('half', 9600, '_half_duplex')):
+        _, _, lines = (VECTOR_FOLDER / 'captures' / f'libplctag_client_crc_plc5{name}.cap'
+                       ).read_text('ascii').partition('\n')
+        paths.append(tmp_path / duplex)
+        paths[-1].write_text(f'# abdf1_ros capture 1\n# baud: {baud}\n# check: CRC\n'
+                             f'# duplex: {duplex}\n{lines}', 'ascii')
+    for files in (paths, paths[::-1]):
+        assert main(['--summary', *map(str, files)]) == 0
+        head, seen, faults, *_ = capsys.readouterr().out.splitlines()
+        assert seen == ('  seen: 148 commands, 148 replies, 66 of them with an error, 48 polls, '
+                        '295 ACK')
+        assert (faults, 'load' in head) == ('  faults: none', False)  # it has two speeds
 
 
 def test_options_and_bytes_win_over_the_head_of_a_capture(capsys: Output, capture: str) -> None:
