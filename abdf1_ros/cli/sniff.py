@@ -75,7 +75,7 @@ from abdf1_ros.sniffer.pcapng import PcapngWriter
 from abdf1_ros.sniffer.report import json_line, summary_json, summary_lines, text_line
 from abdf1_ros.sniffer.summary import Summary
 from abdf1_ros.sniffer.traffic import TrafficDecoder
-from abdf1_ros.text import counted
+from abdf1_ros.text import counted, printable
 
 if TYPE_CHECKING:
     from abdf1_ros.cli.sniff_picture import Timeline
@@ -316,7 +316,24 @@ def parse(args: Sequence[str] | None) -> argparse.Namespace:
         parser.error('--settings and --conformance are for --report')
     if options.anonymous and not (options.report or options.html):
         parser.error('--anonymous is for --report and --html')
+    _check_outputs(parser, options)
     return options
+
+
+def _check_outputs(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
+    """End the program if a file that will be written is also an input or another output."""
+    others = [*options.files, *options.settings, *options.conformance]
+    for path in filter(None, (options.save, options.pcapng, options.html, options.report)):
+        if any(_is_same_file(path, other) for other in others):
+            parser.error(f'{printable(path)} is named twice; give the output another name')
+        others.append(path)
+
+
+def _is_same_file(one: str, other: str) -> bool:
+    try:
+        return os.path.samefile(one, other)
+    except OSError:  # one of them is not there yet
+        return os.path.realpath(one) == os.path.realpath(other)
 
 
 def _decode_files(options: argparse.Namespace, output: Output) -> int:

@@ -246,7 +246,8 @@ def test_port_or_file_that_cannot_be_opened_is_named(capsys: Output, tmp_path: P
 def test_packets_go_nowhere_else_than_into_pcapng(capsys: Output, capture: str) -> None:
     assert refused(capsys, '--pcapng', '/nowhere/x', capture).endswith(
         'sniff: --pcapng: /nowhere/x: No such file or directory\n')
-    assert 'exists and was not made by --pcapng' in refused(capsys, '--pcapng', capture, capture)
+    assert 'exists and was not made by --pcapng' in refused(
+        capsys, '--pcapng', str(Path(capture).parent), capture)
     with no_file_longer_than(200):
         assert main(['--pcapng', f'{capture}.pcapng', capture]) == 2
     assert 'File too large; no more packets are written\n' in capsys.readouterr().err
@@ -254,12 +255,16 @@ def test_packets_go_nowhere_else_than_into_pcapng(capsys: Output, capture: str) 
         file.write('0.05 > 10 02 31\n')  # broken off: it is told at the end
     whole = f'{capture}.whole'
     assert lines_of(capsys, '--pcapng', whole, capture)[5].endswith('DLE ETX')
+    with pytest.raises(SystemExit):  # it would be replaced before it is read
+        main(['--pcapng', whole, capture, whole])
+    assert f'{whole} is named twice; give the output' in capsys.readouterr().err
     assert len([*PacketFile(whole, BytesIO(Path(whole).read_bytes())).packets()]) == 6
 
 
 @for_all('args', [
     [], ['x', '--port', 'y'], ['--port', 'x', '--tap', 'y', 'z'], ['x', '--save', 'y'],
     ['--port', 'x', '--binary'], ['--tap', 'x'], ['--tap', 'x', 'x'],
+    ['--port', 'x', '--save', 'y', '--html', './y'],
     ['x', '--check', 'md5'], ['x', '--baud', '7'], ['x', '--conformance', 'y'],
     ['x', '--seconds', 'many'], ['x', '--seconds', '1_0'], ['x', '--baud', '9_600']])
 def test_option_that_is_wrong_is_told_with_status_2(capsys: Output, args: list[str]) -> None:
