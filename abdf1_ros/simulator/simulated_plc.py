@@ -79,12 +79,15 @@ class _Mover:
     next_time: float = 0.0
 
     def advance(self, table: DataTable, now: float) -> None:
-        """Make the steps that are due."""
+        """Make the steps that are due; a word that was written and is not BCD stays as it is."""
         if now < self.next_time:
             return
         steps = int((now - self.next_time) / self.period) + 1
         self.next_time += steps * self.period
-        values = self.codec.decode(table.read(self.address, self.codec.words))
+        try:
+            values = self.codec.decode(table.read(self.address, self.codec.words))
+        except FormatError:
+            return
         if isinstance(values, str):
             return
         if self.motion is Motion.RAMP:

@@ -242,6 +242,15 @@ def test_ramp_of_floats_and_members(path: Path, clock: Clock) -> None:
     assert master.read('T4:0', 2) == bytes(4)
 
 
+def test_motion_waits_until_a_word_is_bcd_again(path: Path, clock: Clock) -> None:
+    plc, = load(path, clock, '1,SLC,D9:0,1,5,Ramp,100')
+    for written, after in (('cdab', 'cdab'), ('9901', '0002')):
+        plc.table.write(parse_address('D9:0', PlcType.SLC), bytes.fromhex(written))
+        clock.now += 0.1001
+        plc.advance()
+        assert stored(plc, 'D9:0').hex() == after
+
+
 def test_motion_goes_on_from_what_was_written(path: Path, clock: Clock) -> None:
     plc, = load(path, clock, '1,SLC,N7:0,1,0,Ramp,100')
     master = Master(plc)
