@@ -25,6 +25,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Sequence
+from functools import partial
 import math
 from operator import itemgetter
 import os
@@ -192,9 +193,8 @@ class Cast:
     def __init__(self, options: argparse.Namespace,
                  on_lamp: Callable[[str, Lamp, bool], None] = lambda *lamp: None) -> None:
         self.say: Callable[[str], None] = _print
-        self._plcs = _load(options)
-        for station in options.ladder:
-            self._run_ladder(station, on_lamp)
+        self._on_lamp = on_lamp
+        self._plcs = _load(options, self._tell_lamp)
         self._line = _make_line(options)
         self._is_full_duplex = options.full_duplex is not None
         self._link = _make_thread(self._plcs, self._line, options, self._tell)
@@ -232,20 +232,10 @@ class Cast:
         self._link.stop()
         self._line.close()
 
-    def _run_ladder(self, station: str, on_lamp: Callable[[str, Lamp, bool], None]) -> None:
-        """Run the ladder program of a station, and print changes of its lamps."""
-        plc = _plc('--ladder', station, self._plcs)
-
-        def tell(at: float, lamp: Lamp, is_on: bool) -> None:
-            if lamp in _LAMPS:
-                self.say(f'station {station}: {_LAMPS[lamp]} {"on" if is_on else "off"}')
-                on_lamp(station, lamp, is_on)
-
-        try:
-            plc.run_ladder(Ladder(plc.table, on_lamp=tell))
-        except NoSuchFile as error:
-            raise ValueError(
-                f'--ladder {station}: {error}; it needs N10, N11, B12 and T13') from None
+    def _tell_lamp(self, station: str, at: float, lamp: Lamp, is_on: bool) -> None:
+        if lamp in _LAMPS:
+            self.say(f'station {station}: {_LAMPS[lamp]} {"on" if is_on else "off"}')
+            self._on_lamp(station, lamp, is_on)
 
 
 def _try_out(script: TimedCommands, options: argparse.Namespace) -> None:
@@ -259,12 +249,27 @@ def _try_out(script: TimedCommands, options: argparse.Namespace) -> None:
             raise CommandError(f'--at: {error}') from None
 
 
-def _load(options: argparse.Namespace) -> list[SimulatedPlc]:
-    """Return the PLCs of the data file; with --full-duplex only the PLC that it names."""
+def _load(options: argparse.Namespace,
+          on_lamp: Callable[[str, float, Lamp, bool], None] = lambda *lamp: None
+          ) -> list[SimulatedPlc]:
+    """
+    Return the PLCs of the data file with their ladder programs.
+
+    With --full-duplex it is only the PLC that the option names. ``on_lamp`` gets the station, and
+    what its ladder program reports.
+    """
     plcs = load_plcs(options.data or str(config_file('simulator.csv')),
                      Checksum(options.check), time.monotonic, threading.Lock)
-    return plcs if options.full_duplex is None else [
-        _plc('--full-duplex', options.full_duplex, plcs)]
+    if options.full_duplex is not None:
+        plcs = [_plc('--full-duplex', options.full_duplex, plcs)]
+    for station in options.ladder:
+        plc = _plc('--ladder', station, plcs)
+        try:
+            plc.run_ladder(Ladder(plc.table, on_lamp=partial(on_lamp, station)))
+        except NoSuchFile as error:
+            raise ValueError(
+                f'--ladder {station}: {error}; it needs N10, N11, B12 and T13') from None
+    return plcs
 
 
 def _plc(option: str, station: str, plcs: Sequence[SimulatedPlc]) -> SimulatedPlc:

@@ -31,6 +31,7 @@ from unittest.mock import Mock
 from abdf1_ros.cli.simulator import Cast, main, parse_options
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.paths import config_file
 from abdf1_ros.ports.link_thread import PortKind, PortState
 from abdf1_ros.simulator.ladder import Lamp
 import pytest
@@ -201,6 +202,8 @@ def _refused(capsys: Output, *options: str, status: int = 2) -> str:
     (('--at', '5 silent 3'), 2, '--at: name a station (1, 2)'),
     (('--at', '5 msg 1 N7:0 5'), 2, '--at: "msg 1 N7:0 5" is not a command'),
     (('--at', '5 slow 1 x'), 2, '--at: slow 1 x: "x" should be'),
+    (('--data', str(config_file('simulator.csv')), '--ladder', '2', '--at', '1 reset 2',
+      '--at', '2 scan 2 x'), 2, '--at: scan 2 x: "x" should be'),
     (('--full-duplex', '7'), 2, '--full-duplex: name a station (1, 2)'),
     (('--data', '/nowhere'), 2, '/nowhere: cannot be read: No such file or directory'),
     (('--pty', '/nowhere/plc'), 1, '/nowhere/plc cannot be made: No such file or directory'),
