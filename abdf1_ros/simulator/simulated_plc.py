@@ -208,10 +208,14 @@ class SimulatedPlc(TaskSource):
         return self.processor.mode.is_running
 
     def run_ladder(self, ladder: Ladder) -> None:
-        """Run a program from now on; a download restores the present words of the tables."""
+        """Run a program from now on."""
         self.ladder = ladder
-        self._saved = copy.deepcopy(self.table)
+        self.save()
         self._set_ladder()
+
+    def save(self) -> None:
+        """Let a download restore the present words."""
+        self._saved = copy.deepcopy(self.table)
 
     def set_mode(self, setting: Setting) -> None:
         """Change the mode, like the key or the programming software."""
@@ -316,6 +320,8 @@ def load_plcs(path: str, checksum: Checksum, clock: Callable[[], float],
             problems.append(problem)
     if problems:
         raise ConfigurationError(problems)
+    for plc in plcs.values():
+        plc.save()
     return list(plcs.values())
 
 

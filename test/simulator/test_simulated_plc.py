@@ -388,6 +388,13 @@ def test_download_brings_back_the_words_of_the_start() -> None:
     assert stored(plc, 'S:1')[1] >> 7 == 1  # the first scan
 
 
+def test_download_without_a_ladder_brings_back_the_data_file(path: Path, clock: Clock) -> None:
+    plc, = load(path, clock, '1,SLC,N7:0,2,7 8,,')
+    store(plc, 'N7:0', [5])
+    plc.download()
+    assert stored(plc, 'N7:0', 2) == bytes([7, 0, 8, 0])
+
+
 def test_power_cycle_keeps_words_and_begins_anew() -> None:
     clock, plc = _with_ladder()
     store(plc, 'N10:0', [5, 42])
