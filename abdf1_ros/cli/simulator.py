@@ -253,7 +253,7 @@ def _load(options: argparse.Namespace,
           on_lamp: Callable[[str, float, Lamp, bool], None] = lambda *lamp: None
           ) -> list[SimulatedPlc]:
     """
-    Return the PLCs of the data file with their ladder programs.
+    Return the PLCs of the data file with their ladder programs, for the mode of the line.
 
     With --full-duplex it is only the PLC that the option names. ``on_lamp`` gets the station, and
     what its ladder program reports.
@@ -262,6 +262,10 @@ def _load(options: argparse.Namespace,
                      Checksum(options.check), time.monotonic, threading.Lock)
     if options.full_duplex is not None:
         plcs = [_plc('--full-duplex', options.full_duplex, plcs)]
+        plcs[0].be_full_duplex()
+    elif options.radio:
+        for plc in plcs:
+            plc.be_radio(plcs[0].counters)
     for station in options.ladder:
         plc = _plc('--ladder', station, plcs)
         try:
@@ -396,7 +400,6 @@ def _full_duplex(plc: SimulatedPlc, checksum: Checksum, timing: LineTiming) -> M
             machine, LinkSettings(station=None, checksum=checksum), ActiveStationList(), plc.serve)
         return peer.run(plc)
 
-    plc.be_full_duplex()
     return Machine(run, checksum=checksum, duplex=Duplex.FULL, timing=timing,
                    counters=plc.counters)
 
@@ -409,8 +412,6 @@ def _radio(plcs: Sequence[SimulatedPlc], checksum: Checksum, timing: LineTiming)
         return replies[0] if replies else None
 
     first, *others = plcs
-    for plc in plcs:
-        plc.be_radio(first.counters)
     settings = LinkSettings(
         station=first.station, checksum=checksum, also=[plc.station for plc in others])
     return Machine(

@@ -53,6 +53,9 @@ _SCANS = 1, 1000  # ms
 # Where a simulated PLC sends its messages: the default Station of a net CSV.
 _BRIDGE_STATION = Network().station
 
+# Faults that need polls, and faults that need a port of the PLC on the line.
+_OF_POLLS = ('slow', 'delay')
+_OF_PORT = (*_OF_POLLS, 'full', 'noise')
 
 _MODES = {'program': Setting.PROGRAM, 'test': Setting.TEST, 'run': Setting.REMOTE}
 
@@ -107,20 +110,32 @@ def execute(line: str, plcs: Sequence[SimulatedPlc], is_full_duplex: bool = Fals
     if verb == 'counters' and not arguments:
         counts = plc.counters.by_mnemonic().items()
         return f'station {plc.station}: {" ".join(f"{name}={count}" for name, count in counts)}'
-    plc.faults = _faults(line, verb, arguments, is_full_duplex)
+    faults = _faults(line, verb, arguments)
+    _check_effect(plc, verb)
+    plc.faults = faults
     return f'station {plc.station}: {" ".join([verb, *arguments])}'
 
 
-def _faults(line: str, verb: str, arguments: list[str], is_full_duplex: bool) -> InjectedFaults:
+def _check_effect(plc: SimulatedPlc, verb: str) -> None:
+    """Raise CommandError for a fault that has no effect in the place of the PLC."""
+    place, without_effect = (
+        ('behind a radio modem', _OF_PORT) if plc.is_radio else
+        ('on a full-duplex line', _OF_POLLS) if plc.processor.is_full_duplex else
+        ('behind a gateway', _OF_PORT) if plc.via is not None else ('', ()))
+    if verb in without_effect:
+        raise CommandError(f'station {plc.station} is {place}, where "{verb}" has no effect')
+
+
+def _faults(line: str, verb: str, arguments: list[str]) -> InjectedFaults:
     faults = InjectedFaults()
     try:
         if verb == 'silent' and not arguments:
             faults.silent = True
         elif verb == 'full' and not arguments:
             faults.full = True
-        elif verb == 'slow' and len(arguments) == 1 and not is_full_duplex:
+        elif verb == 'slow' and len(arguments) == 1:
             faults.slow = _polls(arguments[0])
-        elif verb == 'delay' and len(arguments) == 1 and not is_full_duplex:
+        elif verb == 'delay' and len(arguments) == 1:
             faults.delay = _decimal(arguments[0], 'ms', _LONGEST) / 1000
         elif verb == 'noise' and len(arguments) == 1:
             faults.noise = _decimal(arguments[0], 'a share', 1)

@@ -160,6 +160,7 @@ class SimulatedPlc(TaskSource):
                  processor: EmulatedProcessor | None = None) -> None:
         self.station = station
         self.via = via
+        self.is_radio = False
         self.table = table
         self.faults = InjectedFaults()
         self.processor = processor or EmulatedProcessor()
@@ -186,6 +187,7 @@ class SimulatedPlc(TaskSource):
     def be_radio(self, counters: Counters) -> None:
         """Answer from now on as a PLC behind a radio modem whose port has these counters."""
         self.counters = counters
+        self.is_radio = True
         self._server = self._make_server('Radio')
 
     def _make_server(self, mode: str) -> Server:

@@ -204,6 +204,8 @@ def _refused(capsys: Output, *options: str, status: int = 2) -> str:
     (('--at', '5 slow 1 x'), 2, '--at: slow 1 x: "x" should be'),
     (('--data', str(config_file('simulator.csv')), '--ladder', '2', '--at', '1 reset 2',
       '--at', '2 scan 2 x'), 2, '--at: scan 2 x: "x" should be'),
+    (('--radio', '--at', '5 full 2'), 2, '--at: station 2 is behind a radio modem, where "full"'),
+    (('--full-duplex', '1', '--at', '5 slow 1 2'), 2, '--at: station 1 is on a full-duplex line,'),
     (('--full-duplex', '7'), 2, '--full-duplex: name a station (1, 2)'),
     (('--data', '/nowhere'), 2, '/nowhere: cannot be read: No such file or directory'),
     (('--pty', '/nowhere/plc'), 1, '/nowhere/plc cannot be made: No such file or directory'),

@@ -518,6 +518,16 @@ def test_command_that_is_wrong_changes_nothing(
     assert plcs[0].faults is before
 
 
+def test_fault_that_would_have_no_effect_is_refused(plcs: list[SimulatedPlc]) -> None:
+    plcs[0].be_radio(plcs[0].counters)
+    plcs[1].via = 10
+    for line in ('full {}', 'noise {} 1', 'slow {} 3', 'delay {} 50'):
+        for station, place in (('1', 'radio modem'), ('12', 'gateway')):
+            with pytest.raises(CommandError, match=f'{station} is behind a {place}, where'):
+                execute(line.format(station), plcs)
+    assert plcs[0].faults == plcs[1].faults == InjectedFaults()
+
+
 @pytest.mark.parametrize('line', ['hush 1', 'silent 3'])
 def test_bad_command_is_told_the_commands_and_no_more(plcs: list[SimulatedPlc], line: str) -> None:
     with pytest.raises(CommandError) as caught:
