@@ -139,7 +139,9 @@ class Times:
         self._mode, self._line = network.line_mode, network.line
         model = forecast.line_model(network)
         on_demand = map(Planner(model, default_period=0.0).alone, mappings.on_demand)
-        reads = [time for block in (*blocks, *on_demand) for time in block.line_times]
+        # The blocks may have been planned for another line: see ``advice``.
+        reads = [model.read_time(block.dialect, request, block.station)
+                 for block in (*blocks, *on_demand) for request in block.requests]
         self._written = {mapping: _packets(model, mapping) for mapping in mappings.written}
         # The command of a guest that is under way may be the longest that exists.
         guest = model.transaction_time(MAX_LINK_DATA, MAX_LINK_DATA) if network.share else 0.0
@@ -264,8 +266,9 @@ class Times:
                 'ENQ_Retries 1': replace(network, enq_retries=1),
                 'Baud 19200': replace(network, baud=19200),
                 'Polling Message': replace(network, polling='Message')}
-        least, way = min((Times(other, self._mappings, self._blocks).worst, way)
-                         for way, other in ways.items())
+        least, way = min(
+            (Times(other, self._mappings, self._blocks, self._response_time).worst, way)
+            for way, other in ways.items())
         if least < _WORTH_IT * self.worst:
             yield (f'{way} would shorten the longest of these times most, from '
                    f'{milliseconds(self.worst)} to {milliseconds(least)}')

@@ -200,14 +200,16 @@ def test_rule_16_preset_of_the_timer(period: int, factor: int | None, other: int
     (replace(QUICK, timeout=100, polling='Standard'), 'Polling Message'),
     (replace(QUICK, timeout=100), '')])
 def test_rule_16_says_which_setting_shortens_the_times_most(network: Network, way: str) -> None:
-    for row in (speed(200), beat(100)):
-        advice = list(Times(network, Rows([row])).advice())
+    for row, length in ((speed(200), 1), (speed(200), 100), (beat(100), 100)):
+        rows = [row, make_mapping('N9:0', length=length)]
+        advice = list(make_report(network, rows, 0.1, 0.05).times.advice())
         assert len(advice) == bool(way)
         for text in advice:
             assert text.startswith(f'{way} would shorten the longest of these times most, from ')
             name, value = way.split()
             kind = type(getattr(network, name.lower()))
-            better = Times(replace(network, **{name.lower(): kind(value)}), Rows([row])).worst
+            other = replace(network, **{name.lower(): kind(value)})
+            better = make_report(other, rows, 0.1, 0.05).times.worst
             assert text.endswith(f' to {milliseconds(better)}')
 
 
