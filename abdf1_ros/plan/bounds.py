@@ -27,7 +27,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 import math
 
-from abdf1_ros.df1.frames import Duplex, MAX_LINK_DATA
+from abdf1_ros.df1.frames import Duplex, MAX_LINK_DATA, stuff
 from abdf1_ros.pccc.steps import write_requests
 from abdf1_ros.pccc.values import ValueType
 from abdf1_ros.plan import forecast
@@ -41,6 +41,7 @@ from abdf1_ros.settings.heartbeats import (
     STABLE,
     TIME_BASE,
 )
+from abdf1_ros.settings.limits import raw_values
 from abdf1_ros.settings.map_row import CellFault
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
@@ -335,10 +336,11 @@ def _with_answers(packets: Sequence[float], response_time: float) -> float:
 
 
 def _packets(model: LineModel, mapping: Mapping) -> list[float]:
-    """Return the line time (s) of each transaction of a write of a row."""
+    """Return the line time (s) of each transaction of a write of a row: of its Fallback, or 0."""
     zeros = '' if mapping.type is ValueType.STRING else [0] * mapping.length
-    return [model.transaction_time(len(body), 0) for _, body in write_requests(
-        mapping.address, mapping.codec, zeros, mapping.dialect)]
+    values = raw_values(mapping, mapping.fallback.values) if mapping.fallback else zeros
+    return [model.transaction_time(len(stuff(body)), 0) for _, body in write_requests(
+        mapping.address, mapping.codec, values, mapping.dialect)]
 
 
 def own_work(model: LineModel, mappings: Rows, default_period: float,

@@ -108,6 +108,16 @@ def test_rule_16_bound_counts_all_that_may_go_before_a_fallback(others: int, rea
                           'where no frame gets lost')
 
 
+@for_all(('element', 'value', 'doubled'), [(16, 0, 1), (15, 0x1010, 200), (16, 0x1010, 201)])
+def test_rule_16_counts_doubled_bytes_of_a_fallback(
+        element: int, value: int, doubled: int) -> None:
+    rows = [make_mapping(f'N7:{first}', 'Write', length=100, fallback=Fallback((word,) * 100, 500))
+            for first, word in ((15, 0), (element, value))]
+    plain, other = (next(Times(QUICK, Rows([row])).bounds()).usual or 0.0 for row in rows)
+    # What is under way, a read and the fallback may each be as long.
+    assert other - plain == pytest.approx(3 * doubled * 10 / 19200)
+
+
 def test_rule_16_longest_packet_of_any_read_counts_also_of_one_on_demand() -> None:
     """And the remarks on the times count the same transactions."""
     slow = Network(baud=1200, timeout=300)
