@@ -56,7 +56,8 @@ class _NotedTable(DataTable):
                  others: FileType | None = None) -> None:
         super().__init__(plc_type)
         self._others = others
-        self._types = {row.address.file: row.address.file_type for row in rows}
+        self._types = {row.address.file: row.address.file_type for row in rows
+                       if not row.address.is_by_type}
         self.written: list[tuple[Address, int]] = []
         self.is_elsewhere = False
 
@@ -73,7 +74,7 @@ class _NotedTable(DataTable):
 
     def write(self, address: Address, data: bytes) -> None:
         """Note which words of files of rows are written."""
-        if address.file in self._types:
+        if address.is_by_type or address.file in self._types:
             self.written.append((address, len(data) // 2))
 
 

@@ -146,6 +146,11 @@ class Address:
         """Return how many words the area can have at most."""
         return self.addressing.area_size(self)
 
+    @property
+    def is_by_type(self) -> bool:
+        """Tell whether the number of its file is free for files of other types, too."""
+        return self.addressing.has_sections or self.file_type.is_function
+
     def may_share_file(self, other: Address) -> bool:
         """
         Tell whether both addresses may lie in one file, or slot, of a PLC.
@@ -158,8 +163,7 @@ class Address:
             return False
         if not self._is_found_like(other):
             return True
-        is_by_type = self.addressing.has_sections or mine.file_type.is_function \
-            or others.file_type.is_function
+        is_by_type = self.is_by_type or other.is_by_type
         return mine.file == others.file and (not is_by_type or mine.file_type is others.file_type)
 
     def counts_like(self, other: Address) -> bool:

@@ -54,8 +54,9 @@ class DataTable:
 
     def create(self, address: Address, words: int) -> None:
         """Make the file of ``address`` long enough for ``words`` words from there on."""
-        known = self._types.setdefault(address.file, address.file_type)
-        if known is not address.file_type and not address.addressing.has_sections:
+        known = address.file_type if address.is_by_type \
+            else self._types.setdefault(address.file, address.file_type)
+        if known is not address.file_type:
             raise NoSuchFile(f'file {address.file} is of type {known.value} already')
         store = self.words.setdefault(address.area, bytearray())
         per_element = address.layout.words
@@ -67,7 +68,7 @@ class DataTable:
         return len(self.words[area]) // 2
 
     def file_type(self, file: int) -> FileType:
-        """Return the type of a file by its number."""
+        """Return the type of a file by its number, which is not that of a function file."""
         try:
             return self._types[file]
         except KeyError:

@@ -340,7 +340,7 @@ def _file_remarks(station: int, mappings: Iterable[Mapping]) -> Iterator[Remark]
     files: defaultdict[tuple[PlcType, int], dict[FileType, list[Mapping]]] = defaultdict(dict)
     for mapping in mappings:
         address = mapping.address
-        if not address.addressing.has_sections and mapping.access is not Access.CIF:
+        if not address.is_by_type and mapping.access is not Access.CIF:
             files[mapping.plc_type, address.file].setdefault(address.file_type, []).append(mapping)
     for (_, number), types in sorted(files.items(), key=lambda item: item[0][1]):
         if len(types) > 1:

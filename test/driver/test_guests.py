@@ -168,6 +168,7 @@ def test_a_write_of_a_guest_is_read_again_at_once(kind: str, address: str, write
     ('SLC', '0F AB 02 03 85 01 00 01 00 01 00', 'B3:1', 1),
     ('SLC', '0F AA 04 09 89 05 00 34 12 00 00', '', 0),  # no row is in N9
     ('SLC', '0F A2 02 07 89 00 00', '', 0), ('SLC', '06 00 12', '', 0),
+    ('SLC', '0F AA 02 04 86 00 02 34 12', '', 1),  # file 4 is T, whatever number EII has
     # Typed writes: the third word of a transaction of 3; file 20, whose type no address tells.
     ('PLC5', '0F 67 02 00 03 00 06 07 05 93 09 42 34 12', 'N7:7', 1),
     ('PLC5', '0F 67 00 00 02 00 06 14 03 95 09 42 01 00 02 00', 'N20:3', 2),
@@ -182,7 +183,7 @@ def test_words_of_a_write_are_known_by_its_address(entry: tuple[str, str, str, i
     plc, text, address, length = entry
     data = bytes.fromhex(text)
     rows = [make_mapping(text, plc=plc, station=1, period=50) for text in (
-        'N7:0', 'F8:0', 'B3:0', *(('N20:0', 'N9:0') if plc == 'PLC5' else ()))]
+        'N7:0', 'F8:0', 'B3:0', *(('N20:0', 'N9:0') if plc == 'PLC5' else ('EII:0.IS',)))]
     found = written_extents(Packet(1, 9, data[0], 0, 1, data[1:]), 1, Rows(rows))
     expected = [make_mapping(address, plc=plc, length=length).extent] if address else []
     assert found == expected

@@ -93,6 +93,15 @@ def test_file_number_has_one_type() -> None:
         words.file_type(8)
 
 
+def test_function_file_has_a_number_of_its_own() -> None:
+    words = table(('O:0.0', 1), ('HSC:0', 18), ('EII:0', 4), ('T4:0', 3))
+    assert words.file_type(0) is FileType.OUTPUT
+    for number, text in enumerate(('O:0.0', 'HSC:0.MOD', 'EII:0.IS', 'T4:0.ACC')):
+        words.write(at(text), bytes((number, 0)))
+    for number, text in enumerate(('O:0.0', 'HSC:0.MOD', 'EII:0.IS', 'T4:0.ACC')):
+        assert replied(words, *dialect_of(SLC).read(at(text), 1)) == bytes((number, 0))
+
+
 def extent(text: str, length: int = 1, station: int = 1) -> Extent:
     """Return the words of a mapping."""
     return make_mapping(text, 'Write', plc='SLC', length=length, station=station).extent

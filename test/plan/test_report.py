@@ -255,8 +255,9 @@ def test_file_of_a_plc_has_one_type() -> None:
     # A PLC-3 numbers the files of each type by themselves; an I/O slot is of no file.
     assert texts(report_of(*[make_mapping(f'{kind}10:0', plc='PLC3') for kind in 'NB']),
                  RemarkKind.STATION) == []
-    assert texts(report_of(make_mapping('I:1.0', plc='SLC'), make_mapping('O:1.0', plc='SLC')),
-                 RemarkKind.STATION) == []
+    # And PTO is number 1 of the function files.
+    assert texts(report_of(*[make_mapping(text, plc='SLC') for text in (
+        'I:1.0', 'O:1.0', 'PTO:0.OUT')]), RemarkKind.STATION) == []
 
 
 def test_several_stations_in_full_duplex() -> None:

@@ -149,6 +149,8 @@ def directory_of(table: DataTable) -> bytes:
     """Return the file directory of an emulated SLC 5/03."""
     sizes: dict[int, tuple[FileType, int]] = {}
     for area in table:
+        if area.file_type.is_function:
+            continue  # an SLC 5/03 has none
         _, size = sizes.get(area.file, (area.file_type, 0))
         sizes[area.file] = area.file_type, size + 2 * table.length(area)
     rows = b''

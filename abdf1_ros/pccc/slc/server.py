@@ -130,6 +130,9 @@ class SlcCommands:
 
     def _address(self, address: slc.LogicalAddress) -> Address:
         kind = BY_CODE.get(address.type_code)
-        if kind is None or self._table.file_type(address.file) is not kind:
+        if kind is None:
             raise Refusal(*self.no_such_file)
-        return Address(ADDRESSING, kind, address.file, address.element, address.sub_element or 0)
+        place = Address(ADDRESSING, kind, address.file, address.element, address.sub_element or 0)
+        if not place.is_by_type and self._table.file_type(address.file) is not kind:
+            raise Refusal(*self.no_such_file)
+        return place
