@@ -27,6 +27,7 @@ import re
 
 from abdf1_ros.pccc.address import Address, AddressRangeError, AddressSyntaxError, BITS
 from abdf1_ros.pccc.file_types import FileType
+from abdf1_ros.pccc.structures import whole_elements
 from abdf1_ros.pccc.values import types_of, ValueType
 
 _RANGE = re.compile(r'(?P<first>.+?)\s*(?:-|\.\.+|\s+TO\s+)\s*(?P<last>.+)', re.ASCII)
@@ -71,9 +72,10 @@ class AddressRange:
         if first.file_type is FileType.STRING and first != last:
             raise AddressSyntaxError(f'each string needs its own row: {self._each()}')
         if first.file_type.is_structure and not self.is_whole and first.element != last.element:
+            whole = whole_elements(first, last)
             raise AddressSyntaxError(
-                f'{first} and {last} are not neighbours; a row each for {self._each()}, or the '
-                f'whole elements with {_whole(first)}-{_whole(last)}')
+                f'{first} and {last} are not neighbours; a row each for {self._each()}'
+                f'{whole and f", or the whole elements with {whole}"}')
         return self._values(kind)
 
     def _bits(self) -> int:
@@ -162,10 +164,6 @@ def _of_count(first: Address, names_word: bool, count: int) -> AddressRange:
 def is_element(address: Address, text: str) -> bool:
     """Tell whether a text names an element of a structure without a word of it."""
     return address.file_type.is_structure and address.bit is None and '.' not in text
-
-
-def _whole(address: Address) -> Address:
-    return replace(address, word=0, bit=None)
 
 
 def _position(address: Address) -> int:

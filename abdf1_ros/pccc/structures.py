@@ -75,9 +75,16 @@ def type_fault(address: Address, kind: ValueType, length: int) -> str | None:
         return None
     for place in _places(address, kind, length):
         if not place.is_value(kind.words):
-            right = 'words of 16 bits' if kind.words == 2 else 'floats'
+            right = 'words of 16 bits' if kind.words == 2 else f'{types_of(place)[0].value} values'
             return f'{length} {kind.value} from {address} reach to {place}, where {right} are'
     return None
+
+
+def whole_elements(first: Address, last: Address) -> str:
+    """Return how to name all words from element to element, empty if they have several types."""
+    start = replace(first, word=0, bit=None)
+    length = (last.element - start.element + 1) * start.layout.words
+    return '' if type_fault(start, types_of(start)[0], length) else f'{start}, and Length {length}'
 
 
 def write_fault(address: Address, kind: ValueType, length: int) -> str | None:

@@ -300,19 +300,20 @@ class RowReader:
 
     def _check_extent(self, mapping: Mapping) -> None:
         address, words = mapping.address, mapping.codec.words
+        column = 'Length' if self._row.get('Length') else 'Address'
         details = (self._row.get('Address'), mapping.length)
         if address.file_type.is_structure and mapping.type is ValueType.BOOL and words > 1:
-            self._fault('Length', 'bits of a structure end with their word',
+            self._fault(column, 'bits of a structure end with their word',
                         Message.ERR_ADDRESS_RANGE, *details)
         elif address.offset + words > address.area_size:
             step = 1 if address.file_type.is_structure else address.layout.words
             last = address.at_offset(address.area_size - step)
             size = '' if mapping.codec.element_words <= address.layout.words else (
                 f'{mapping.length} {mapping.type.value} from {address} on take {words} words; ')
-            self._fault('Length', f'{size}the last word there can be is {last}',
+            self._fault(column, f'{size}the last word there can be is {last}',
                         Message.ERR_ADDRESS_RANGE, *details)
         elif fault := type_fault(address, mapping.type, mapping.length):
-            self._fault('Length', fault)
+            self._fault(column, fault)
 
     def _check_write(self, mapping: Mapping) -> None:
         address = mapping.address

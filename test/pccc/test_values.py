@@ -211,8 +211,9 @@ def at(text: str, family: PlcType = PLC5) -> Address:
     ('N7:0', 'float32', 50, None), ('F8:0', 'float32', 9, None), ('PD9:0/EN', 'bool', 1, None),
     ('PD9:0.SP', 'float32', 25,
      '25 float32 from PD9:0.SP reach to PD9:0.50, where words of 16 bits are'),
-    ('PD9:0', 'int16', 3, '3 int16 from PD9:0 reach to PD9:0.SP, where floats are'),
-    ('PD9:0.80', 'uint16', 5, '5 uint16 from PD9:0.80 reach to PD9:1.SP, where floats are')])
+    ('PD9:0', 'int16', 3, '3 int16 from PD9:0 reach to PD9:0.SP, where float32 values are'),
+    ('PD9:0.80', 'uint16', 5,
+     '5 uint16 from PD9:0.80 reach to PD9:1.SP, where float32 values are')])
 def test_range_is_of_one_type(text: str, kind: str, length: int, fault: str | None) -> None:
     assert type_fault(at(text), ValueType(kind), length) == fault
 

@@ -238,6 +238,8 @@ def test_command_says_whether_a_row_reads_and_writes(text: str, reads: bool, wri
     ({'Address': 'PD9:0.SP', 'Length': '25', 'Command': 'Read'},
      '6 (Length): Item: 1, 25 float32 from PD9:0.SP reach to PD9:0.50, where words of 16 bits '
      'are'),
+    ({'Address': 'HSC:0-1', 'PLC_Type': 'SLC', 'Command': 'Read'}, '3 (Address): Item: 1, 36 '
+     'int16 from HSC:0 reach to HSC:0.ACC, where int32 values are'),
     ({'Address': 'MG9:0/EN', 'Command': 'Write'}, '3 (Address): Item: 1, MG9:0/EN belongs to the '
      'processor; of such an element can be written: TO, CO'),
     ({'Address': 'F8:0', 'Word_Order': 'High'}, '13 (Word_Order): Item: 1, Word_Order High is for '
@@ -495,8 +497,10 @@ def test_length_of_a_range_counts_values_of_the_type(kind: str, length: int) -> 
     (SLC, 'N7:0 L10', ['N7:0, and Length 10']), (SLC, 'T4:0[4]', ['T4:0, and Length 12']),
     (SLC, 'B3:1/8{16}', ['B3:1/8, and Length 16']), (PLC3, 'N7:0{3}', ['N7:0, and Length 3']),
     (PLC5, 'I:001/00{16}', ['I:001/00, and Length 16']),
-    (SLC, 'T4:0.ACC-T4:2.ACC', ['T4:0.ACC', 'T4:1.ACC', 'T4:2.ACC', 'T4:0-T4:2']),
-    (SLC, 'T4:0.ACC{3}', ['T4:0.ACC', 'T4:1.ACC', 'T4:2.ACC', 'T4:0-T4:2']),
+    (SLC, 'T4:0.ACC-T4:2.ACC', ['T4:0.ACC', 'T4:1.ACC', 'T4:2.ACC', 'T4:0, and Length 9']),
+    (SLC, 'T4:0.ACC{3}', ['T4:0.ACC', 'T4:1.ACC', 'T4:2.ACC', 'T4:0, and Length 9']),
+    (PLC3, 'T:0.PRE-T:1.PRE', ['T:0.PRE', 'T:1.PRE', 'T:0.CTL, and Length 6']),
+    (SLC, 'HSC:0.ACC-HSC:1.ACC', ['HSC:0.ACC', 'HSC:1.ACC']),
     (SLC, 'ST9:0-2', ['ST9:0', 'ST9:1', 'ST9:2']), (SLC, 'ST9:0{2}', ['ST9:0', 'ST9:1']),
     (SLC, 'I:1-3', ['I:1.0', 'I:2.0', 'I:3.0']),
     (SLC, 'I:1.0/3-I:2.0/3', ['I:1.0/3', 'I:2.0/3']),

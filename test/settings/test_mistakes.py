@@ -121,8 +121,8 @@ def test_address_that_cannot_be_used(tmp_path: Path, address: str, expected: str
         '!3:3 (Address): 2503 ERR_ADDRESS_SYNTAX: Item: 2, Invalid Address Syntax (ST9:0/20); ST '
         'files have no bits to address; the length of a string is not written here']),
     (f'{HEAD},Type\na,Read,N7:255,1,SLC,int32\n', [
-        '!2 (Length): 2504 ERR_ADDRESS_RANGE: Item: 1, Address is out of range (N7:255, len=1); '
-        '1 int32 from N7:255 on take 2 words; the last word there can be is N7:255']),
+        '!2:3 (Address): 2504 ERR_ADDRESS_RANGE: Item: 1, Address is out of range (N7:255, '
+        'len=1); 1 int32 from N7:255 on take 2 words; the last word there can be is N7:255']),
     (f'{HEAD},Period\na,Read,N7:0,1,SLC,0.5\n', [
         '!2:6 (Period): Item: 1, Period = "0.5" should be a whole number from 0 to 86400000 ms, '
         'or "on demand"'])])
@@ -159,7 +159,9 @@ def test_what_is_told_of_a_map(tmp_path: Path, text: str, expected: list[str]) -
     (f'{HEAD},Length\na,Read,T4:0.PRE,1,SLC,2\n', []),
     (f'{HEAD},Length\na,Read,T4:0.ACC,1,SLC,4\n', [
         '2:6 (Length): 4 words from T4:0.ACC on are also the control word T4:1; whole elements '
-        'are T4:0-1']),
+        'are T4:0, and Length 6']),
+    (f'{HEAD},Length,Processor\na,Read,HSC:0.LPO,1,SLC,2,ML1400\n', [
+        '2:6 (Length): 2 words from HSC:0.LPO on are also the control word HSC:1']),
     (f'{HEAD}\na,Write,T4:0/DN,1,SLC\nb,Write,C5:0.ACC,1,SLC\nc,Serve,C5:0/CU,5,PLC5\n', [
         '2:2 (Command): T4:0/DN is set anew by the instruction of the timer with each scan']),
     (f'{HEAD}\nSpeed,Read,N7:0,1,SLC\nspeed,Read,N7:1,1,SLC\nspeeds,Read,N7:2,1,SLC\n', [
