@@ -18,7 +18,7 @@ Read logs of serial port monitors, by one rule for all logs.
 A line has an optional time, a word or sign for the direction, and bytes. The bytes are pairs of
 hexadecimal digits with blanks, commas or dashes between them. Characters beside the bytes have to
 show the same bytes. A line without bytes sets time and direction of the lines after it. A line
-that fits the rule in two ways is refused.
+that fits the rule in two ways is refused, and so is a line of which bytes would be left over.
 """
 
 from __future__ import annotations
@@ -35,12 +35,14 @@ _TIME_OF_DAY = re.compile(
     rf'(?:{_DATE})?(?P<hours>\d\d?):(?P<minutes>\d\d):(?P<seconds>\d\d(?:[.,]\d+)?)(?!:?\d)')
 _SECONDS = re.compile(r'(?<![\d.])\d+\.\d{3,}(?![\d.])')
 _DAY = 86400.0
+_TIME = '~'  # stands for the time in the words of a line
 _SET_BACK = 3600.0  # s; a time of day that is earlier by more than this is of the next day
 
 _OUT = {'tx', 'sent', 'send', 'sending', 'written', 'write', 'wrote', 'irp_mj_write', 'out',
         'transmit', 'transmitted', '>', '>>', '>>>', '->', '-->'}
 _IN = {'rx', 'received', 'receive', 'recv', 'receiving', 'read', 'irp_mj_read', 'in', '<', '<<',
        '<<<', '<-', '<--'}
+_WAYS = {**dict.fromkeys(_OUT, Direction.OUT), **dict.fromkeys(_IN, Direction.IN)}
 _WORD = re.compile(r'[A-Za-z_]+|-*>+|<+-*')
 
 # A line with only bytes: pairs, or groups of pairs, with the same sign between them.
@@ -52,8 +54,13 @@ _AFTER = r'(?![0-9A-Za-z:=.])'
 _BYTES = re.compile(rf'(?:^|(?<=[\s,\[({{"\'])){_BYTE}(?:[\s,;-]+{_BYTE})*{_AFTER}')
 _GAP = re.compile(r'\s{2,}|\t')
 _REST = re.compile(r'[\s,;\])}"\']*')
-# A line with a direction but without bytes is refused if it contains this.
-_LEFT_OVER = re.compile(r'(?<![\w=(.])[0-9A-Fa-f]{1,4}(?![\w=)]| bytes?\b| *\|)')
+# What looks like bytes, and is neither a word, a decimal number, a count, a label nor an offset. A
+# line is refused if this stands between its direction or time and its bytes, or instead of bytes.
+_HEX = r'(?=[A-Fa-f]*\d)[0-9A-Fa-f]+|[A-F]|(?:[A-Fa-f]{2}){1,2}|[0-9A-Fa-f]{2}h'
+_LEFT_OVER = re.compile(
+    rf'(?<![\w=(\[.#])(?:0x|\\x)?(?:{_HEX})'
+    r'(?![\w=)]|:(?:\s|$)| bytes?\b| *\||\.\d+(?![\w.])|(?<=\w{4})(?:\s{2}|\t))|\bb[\'"]')
+_GLUED = re.compile(r'(?:[0-9A-Fa-f]{2})+(?=[\s,;-]|$)')
 _LITERAL = re.compile(r'\bb(?P<sign>[\'"])(?:\\.|(?!(?P=sign)).)*(?P=sign)')
 
 
@@ -78,21 +85,24 @@ class LogReader:
             return self._chunk(bytes.fromhex(line.replace('-', '')))
         head, data = _divided(line)
         time, words = _time_of(head)
-        ways = [way for way, names in ((Direction.OUT, _OUT), (Direction.IN, _IN))
-                if names & {word.lower() for word in _WORD.findall(words)}]
+        # each direction, with the end of its first word
+        ways = {way: match.end() for match in reversed([*_WORD.finditer(words)])
+                if (way := _WAYS.get(match[0].lower()))}
         has_words = re.search('[A-Za-z]', words) is not None
         if time is None and not ways and not data and not (is_first and ',' in line):
-            raise ValueError
-        if ways and not data and _LEFT_OVER.search(words):
             raise ValueError
         if data and has_words and not ways and '0x' not in line.lower():
             data = b''  # such as the settings of a port in the log of a port monitor
             if time is None:
                 raise ValueError
+        after = min(ways.values(), default=words.rfind(_TIME) + 1)
+        if (ways or data) and (_LEFT_OVER.search(words, after if data else 0)
+                               or _GLUED.match(words, after)):
+            raise ValueError
         if time is not None:
             self._time = self._since_begin(time)
         if ways or not data or has_words:
-            self._way = ways[0] if len(ways) == 1 else Direction.UNKNOWN
+            self._way = next(iter(ways)) if len(ways) == 1 else Direction.UNKNOWN
         return self._chunk(data) if data else None
 
     def _chunk(self, data: bytes) -> Chunk:
@@ -110,10 +120,15 @@ class LogReader:
 def _divided(line: str) -> tuple[str, bytes]:
     """Return the head of a line and its bytes; raise ValueError if the border is unclear."""
     if match := _LITERAL.search(line):
-        data = ast.literal_eval(match[0])
+        if _LITERAL.search(line, match.end()) or _LEFT_OVER.search(line, match.end()):
+            raise ValueError
+        try:
+            data = ast.literal_eval(match[0])
+        except SyntaxError:  # it is cut: b'\x1'
+            raise ValueError from None
         assert isinstance(data, bytes)
         return line[:match.start()], data
-    rest = _TIME_OF_DAY.sub(lambda match: '~' * len(match[0]), line)
+    rest = _TIME_OF_DAY.sub(lambda match: _TIME * len(match[0]), line)
     match = next((match for match in _BYTES.finditer(rest)
                   if _REST.fullmatch(rest, match.end()) or _GAP.match(rest, match.end())
                   or _GAP.search(match[0])), None)
@@ -156,11 +171,11 @@ def _are_characters(text: str, data: bytes) -> bool:
 
 
 def _time_of(head: str) -> tuple[float | None, str]:
-    """Return the time (s) of a head, and its other words."""
+    """Return the time (s) of a head, and the head with ``_TIME`` in its place."""
     if match := _TIME_OF_DAY.search(head):
         time = 3600.0 * int(match['hours']) + 60 * int(match['minutes']) \
             + float(match['seconds'].replace(',', '.'))
-        return time, head[:match.start()] + ' ' + head[match.end():]
+        return time, head[:match.start()] + _TIME + head[match.end():]
     if match := _SECONDS.search(head):
-        return float(match[0]), head[:match.start()] + ' ' + head[match.end():]
+        return float(match[0]), head[:match.start()] + _TIME + head[match.end():]
     return None, head

@@ -327,7 +327,12 @@ def test_words_whose_offsets_do_not_fit_are_refused(lines: list[str], text: str)
 @for_all('line', [
     'TX 02 10 06',  # a count and two bytes, or three bytes
     'TX 10 06    ABCD', 'TX  41 42 43  A-C', 'TX: 10 0', 'TX 10 06 and more', 'COM1, opened',
-    'TX: 10:06', 'RX 1006 1', 'port 10 06'])
+    'TX: 10:06', 'RX 1006 1', 'port 10 06',
+    # what would be left over
+    '12:00:01.000 TX 10 05 01 FF RX 10 04', 'TX 10 05 01 FF BCC 0A', 'TX: 10 05 01 FF len: 04',
+    'TX10 05 01 FF', 'TX100501FF', '>10 05 01', 'TX 10 5 01 FF', 'RX 10 0 04', 'TX 5 1 FF',
+    '12:00:01 10 5 01 FF', 'TX 100501FF 0A', 'TX 100501FF', 'RX 10h 04h', 'RX 0x10|0x04',
+    r'RX \x10\x04', r"TX b'\x10\x05' RX b'\x10\x04'", r"TX b'\x10' 06", r"TX b'\x1'", "TX b'AG"])
 def test_what_can_be_read_in_two_ways_is_refused(line: str) -> None:
     with pytest.raises(Problem, match='is not a hexadecimal dump'):
         assert read(iter(['TX: 10 05', line])) == []
@@ -340,6 +345,14 @@ def test_characters_that_look_like_bytes_staycharacters() -> None:
         chunk, = read(iter([line]))
         assert (chunk.data, chunk.direction) == (data, OUT)
     assert [chunk.data for chunk in read(iter(['TX  41 10 43  A_C']))] == [b'A\x10C']
+
+
+@for_all('line', [
+    'TX1 10 06', 'TX (2) 10 06', 'TX #17 10 06', 'TX 2 bytes: 10 06', 'RX a bad reply: 10 06',
+    'RX 12.5 ms: 10 06', '7 12:00:01 10 06', 'uint8_t tx[2] = { 0x10, 0x06 };',
+    '"data",0.0005,0.0001,0x10,0x06', r"Sent 2: b'\x10\x06' (2 bytes)"])
+def test_counts_labels_and_words_are_not_left_over_bytes(line: str) -> None:
+    assert [chunk.data for chunk in read(iter([line]))] == [b'\x10\x06']
 
 
 def test_time_of_day_goes_on_after_midnight() -> None:
