@@ -45,6 +45,7 @@ from abdf1_ros.ros import observer
 from abdf1_ros.ros.topics.messages import latched_qos
 from abdf1_ros.ros.untyped import RosMessage
 from abdf1_ros.simulator.commands import execute
+from abdf1_ros.simulator.gateway import stations_of
 from abdf1_ros.simulator.ladder import Ladder
 from abdf1_ros.simulator.simulated_plc import load_plcs, SimulatedPlc
 import pytest
@@ -210,7 +211,8 @@ class Plcs:
         self._line = PtyEndpoint(str(data.with_name('plcs')))
         self.port = self._line.name
         self.faults: list[Exception] = []
-        machine = Machine(multidrop(self._plcs), checksum=Checksum.CRC)
+        machine = Machine(
+            multidrop(stations_of(self._plcs, Checksum.CRC)), checksum=Checksum.CRC)
         self.link = LinkThread(machine, self._line.open, on_fault=self.faults.append)
 
     def __enter__(self) -> Plcs:

@@ -22,7 +22,9 @@ import sys
 import threading
 import time
 from typing import Any, BinaryIO
+from unittest.mock import Mock
 
+from abdf1_ros.df1 import frames
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.ros.topics.messages import latched_qos
 from abdf1_ros.testing import abdf1_cell, Bridge, Observer, PATIENCE, Plcs, SimulatedCell
@@ -31,6 +33,7 @@ from rclpy.node import Node
 from std_msgs.msg import Int16MultiArray
 from support.forked import Forked
 from support.ros_tools import SOURCE
+from support.scripted_line import ScriptedLine
 
 EXAMPLE = SOURCE / 'examples' / 'testing'
 TUTORIAL = (SOURCE / 'docs' / 'tutorials' / 'testing.md').read_text(encoding='utf-8')
@@ -147,6 +150,17 @@ def test_program_of_a_ladder_runs_in_the_station_that_is_named(tmp_path: Path) -
     plcs = Plcs(tmp_path / 'data.csv', ladders=[2])
     assert [plcs[number].ladder is None for number in (1, 2)] == [True, False]
     plcs.lose()
+
+
+def test_gateway_of_the_data_answers_for_its_plcs(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / 'data.csv').write_text('Station,PLC_Type,Address,Via\n1,SLC,N7:0,10\n', 'utf-8')
+    monkeypatch.setattr('abdf1_ros.testing.LinkThread', links := Mock())
+    Plcs(tmp_path / 'data.csv').lose()
+    line = ScriptedLine(links.call_args.args[0])
+    for station, answer in ((1, b''), (10, frames.EOT)):
+        line.write(frames.poll_frame(station))
+        assert line.read(1.0) == answer
 
 
 SMALL = ('Station,PLC_Type,Address,Length\n1,SLC,N7:0,2\n',
