@@ -76,6 +76,11 @@ def test_alarm_between_two_statuses_is_shown_once() -> None:
     assert bench.says()[0] == WARN  # whoever looks changes nothing
     bench.alarms.forget()
     assert bench.says() == (OK, 'no alarm')
+    bench.read(1, 0)
+    bench.alarms.forget()
+    bench.read(1, 0)
+    bench.read(0, 0)
+    assert bench.says()[0] == WARN  # it was on after that status, too
 
 
 @pytest.mark.parametrize('alarm', ['WARN 0', 'warn  0'])

@@ -62,7 +62,7 @@ def hexdump(data: bytes) -> list[str]:
 
 @for_all('text', [
     '10 05 01 FF', '100501ff', '1005 01ff', '0x10, 0x05, 0x01, 0xFF', '10,05,01,FF',
-    '  10 05 01 FF  ', '# a poll\n10 05\n\n01 FF\n'])
+    '  10 05 01 FF  ', '# a poll\n10 05\n\n01 FF\n', '2024-05-01T10:00:00.120 10 05 01 FF'])
 def test_bytes_alone_are_read_in_any_notation(text: str) -> None:
     assert joined(text.splitlines()) == b'\x10\x05\x01\xff'
 
