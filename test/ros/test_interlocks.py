@@ -107,6 +107,7 @@ class Cell(BridgeCell):
         """Publish a value until it is in the PLC, where it stays for Fallback_After."""
         def has_come() -> bool:
             publisher.publish(Int16MultiArray(data=[value]))
+            time.sleep(0.01)  # a busy host would take messages of a flood when they are too old
             return self.word('N10:1') == value
 
         self.until(has_come, f'{value} in the PLC')
