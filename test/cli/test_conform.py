@@ -131,8 +131,9 @@ def test_slave_behind_an_adapter_that_echoes(tmp_path: Path, capsys: Output) -> 
     port = str(tmp_path / 'line')
     with running_simulator('--pty', port, '--echo'):
         options = ['slave', '--port', port, *QUICK]
-        assert main([*options, '--echo']) == 0
-        assert '2 passed, 0 failed, 1 skipped' in capsys.readouterr().out
+        # The ACK of a case and the command of the next one are heard as one echo.
+        assert main([*options, '--echo', '--only', 'echo-sizes']) == 0
+        assert '3 passed, 0 failed, 1 skipped' in capsys.readouterr().out
         assert main(options) == 1
         assert 'FAIL  poll-idle' in capsys.readouterr().out
     with running_simulator('--pty', port):
