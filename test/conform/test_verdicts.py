@@ -25,8 +25,7 @@ from abdf1_ros.conform.wire import Failed, Wire
 import pytest
 from support.cases import for_all
 from support.conformance import failures, results_of
-from support.conversations import Conversation, CONVERSATIONS
-from support.listeners import said_by_codec
+from support.conversations import Conversation, CONVERSATIONS, said_by_codec
 from support.mutated_ends import (
     Habit,
     MutatedClient,

@@ -27,7 +27,7 @@ from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.settings.heartbeats import Fallback
 from abdf1_ros.settings.mapping import Mapping
 import pytest
-from support.driver_bench import store
+from support.driver_bench import ListeningBench, store
 from support.interlocks import (
     beat_row,
     Cell,
@@ -41,7 +41,6 @@ from support.interlocks import (
     TIMEOUT,
     WORDS,
 )
-from support.listening import ListeningBench
 from support.mappings import make_mapping
 
 OLD = 888  # a command of before

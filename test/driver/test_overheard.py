@@ -27,7 +27,7 @@ from abdf1_ros.settings.mapping import Mapping
 import pytest
 from support.captures import Capture, CAPTURES
 from support.cases import for_all, long_unless
-from support.listening import ListeningBench
+from support.driver_bench import ListeningBench
 from support.mappings import make_mapping
 from support.odd_device import frame
 

@@ -30,8 +30,16 @@ import pytest
 from std_msgs.msg import Int16MultiArray
 from support.device_server import QueueingServer
 from support.fault_box import FaultBox
-from support.fault_rig import boxed, HeardNode, is_unanswered, NOT_SENT, Rig, SETPOINT, UNKNOWN
-from support.renewed import Renewed
+from support.fault_rig import (
+    boxed,
+    HeardNode,
+    is_unanswered,
+    NOT_SENT,
+    Renewed,
+    Rig,
+    SETPOINT,
+    UNKNOWN,
+)
 from support.ros import ERROR, Observer, Process, ros_args, write_csv
 
 TOO_LATE = 'not written: refused: it came '  # from a process that a busy host let stand still

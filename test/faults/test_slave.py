@@ -19,8 +19,7 @@ import signal
 import time
 
 import pytest
-from support.fault_rig import is_unanswered, NOT_SENT, UNKNOWN
-from support.renewed import Renewed
+from support.fault_rig import is_unanswered, NOT_SENT, Renewed, UNKNOWN
 from support.ros import ERROR, Observer
 from support.slave_rig import Line, two_nodes
 

@@ -36,7 +36,7 @@ from abdf1_ros.sniffer.capture import Chunk, Direction
 import pytest
 import serial
 from support.cases import for_all
-from support.listening import ListeningBench
+from support.driver_bench import ListeningBench
 from support.mappings import make_mapping
 from support.ptys import PATIENCE, Pty, read_exactly, wait_until
 

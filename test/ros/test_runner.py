@@ -12,11 +12,17 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The threads of callbacks, and the one sequence of an end, for one bridge or many."""
+"""
+The threads of callbacks, and the one sequence of an end, for one bridge or many.
+
+And the signs of life that systemd waits for (WatchdogSec of the units in deploy/).
+"""
 
 from collections.abc import Callable, Iterator
 from itertools import groupby, pairwise
+from pathlib import Path
 from queue import SimpleQueue
+import socket
 import threading
 import time
 from typing import Any
@@ -29,12 +35,11 @@ from abdf1_ros.ros.callbacks import AnsweringNode, Callbacks
 from abdf1_ros.ros.diagnostics.log import MOST_ENTRIES
 from abdf1_ros.ros.process.runner import Line, Runner
 from abdf1_ros.ros.process.supervisor import Supervisor
-from abdf1_ros.testing import PATIENCE
 import pytest
 from rclpy.executors import SingleThreadedExecutor, TimeoutException
 from rclpy.logging import get_logger
 from std_msgs.msg import Bool
-from support.ros import Observer
+from support.ros import EXAMPLE_FILES, Observer, PATIENCE, Process, ros_args
 
 
 class Recorder:
@@ -294,3 +299,76 @@ def test_subscription_is_heard_again_after_a_message_that_cannot_be_taken(
         publisher.publish(Bool(data=value))
     assert heard.get(timeout=PATIENCE) is False
     assert capfd.readouterr().err.count('a message on /odd has failed') == 2
+
+
+class Link:
+    """A link whose thread stands still."""
+
+    has_turned = True
+    alive = True
+
+    def is_alive(self) -> bool:
+        return self.alive
+
+    def wake(self) -> None:
+        pass
+
+
+@pytest.fixture
+def systemd(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[socket.socket]:
+    path = str(tmp_path / 'notify')
+    monkeypatch.setenv('NOTIFY_SOCKET', path)
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as receiver:
+        receiver.bind(path)
+        receiver.settimeout(PATIENCE)
+        yield receiver
+
+
+def test_no_sign_while_a_link_stands_still(
+        systemd: socket.socket, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv('WATCHDOG_USEC', '3')
+    link, other = Link(), Link()
+    supervisor = Supervisor()
+    supervisor.look([link, other])
+    assert [systemd.recv(99), systemd.recv(99)] == [b'READY=1', b'WATCHDOG=1']
+    other.has_turned = True
+    supervisor.look([link, other])
+    systemd.setblocking(False)
+    with pytest.raises(BlockingIOError):
+        systemd.recv(99)
+    link.alive, other.has_turned = False, True
+    supervisor.look([link, other])
+    assert systemd.recv(99) == b'WATCHDOG=1'
+
+
+@pytest.mark.parametrize(('period', 'signs'), [('', []), ('3000000000', [b'WATCHDOG=1'])])
+def test_a_sign_comes_once_in_the_period_of_the_watchdog_if_there_is_one(
+        systemd: socket.socket, monkeypatch: pytest.MonkeyPatch, period: str,
+        signs: list[bytes]) -> None:
+    if period:
+        monkeypatch.setenv('WATCHDOG_USEC', period)
+    supervisor, link = Supervisor(), Link()
+    for _ in range(2):
+        link.has_turned = True
+        supervisor.look([link])
+    assert [systemd.recv(99) for _ in ('ready', *signs)] == [b'READY=1', *signs]
+    systemd.setblocking(False)
+    with pytest.raises(BlockingIOError):
+        systemd.recv(99)
+
+
+@pytest.mark.parametrize('address', ['', '/nowhere/notify', '@abdf1_nobody'])
+def test_nobody_has_to_listen(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv('NOTIFY_SOCKET', address)
+    monkeypatch.setenv('WATCHDOG_USEC', '3')
+    Supervisor().look([Link()])
+
+
+def test_a_bridge_without_its_port_gives_signs(
+        systemd: socket.socket, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Between two signs its link has turned: it was woken, and tries the port again."""
+    monkeypatch.setenv('WATCHDOG_USEC', '300000')
+    with Process('node', *ros_args(*EXAMPLE_FILES, 'port:=/dev/ttyS99')) as node:
+        assert systemd.recv(99) == b'READY=1'
+        assert [systemd.recv(99) for _ in range(5)] == [b'WATCHDOG=1'] * 5
+        node.end()

@@ -32,8 +32,7 @@ from abdf1_ros.sniffer.traffic import TrafficDecoder
 import pytest
 from support.captures import Capture, CAPTURES, FOLDER
 from support.cases import for_all
-from support.conversations import Conversation, CONVERSATIONS
-from support.listeners import heard_by_sniffer, said_by_sniffer
+from support.conversations import Conversation, CONVERSATIONS, heard_by_sniffer, said_by_sniffer
 from support.multidrop import MasterBench
 from support.vectors import Vector, VECTORS
 from support.virtual_line import Noise, QUIET

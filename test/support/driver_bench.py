@@ -12,15 +12,16 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A driver and simulated PLCs on a virtual line."""
+"""A driver and simulated PLCs on a virtual line; a driver that only listens."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 import heapq
 from itertools import count
 from typing import Any
 
 from abdf1_ros.df1.frames import Duplex
+from abdf1_ros.df1.listen import SecondPort
 from abdf1_ros.df1.machine import LineTiming, Machine, Procedure
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.peer import FullDuplexPeer
@@ -41,6 +42,7 @@ from abdf1_ros.pccc.values import Codec, types_of, Values, ValueType
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
+from abdf1_ros.sniffer.capture import Chunk, Direction
 from support.virtual_line import VirtualLine
 
 READ_N7 = bytes.fromhex('A2 02 07 89 00 00')
@@ -314,3 +316,48 @@ class Program:
     def statuses(self) -> list[int]:
         """Return the STS of all replies."""
         return [reply.sts for _, reply in self.replies]
+
+
+class ListeningBench:
+    """A driver in Mode Listen and its clock; ``has_two_ports``: the far side has its own."""
+
+    def __init__(self, mappings: Sequence[Mapping], *, has_two_ports: bool = False,
+                 check: str = 'CRC', cmd_timeout: int = 1000) -> None:
+        self.now = 0.0
+        self.has_two_ports = has_two_ports
+        self.listener = Recorder(lambda: self.now)
+        self.driver = Driver(
+            Network(mode='Listen', error_code=check, cmd_timeout=cmd_timeout,
+                    listen_port='/dev/second' if has_two_ports else ''),
+            mappings, DriverSettings(), self.listener)
+        self.machine = self.driver.machine
+        self.machine.start(0.0)
+
+    def run(self, seconds: float) -> None:
+        """Let time pass; nothing is ever sent."""
+        end = self.now + seconds
+        while (due := self.machine.next_call) is not None and due <= end:
+            self.now = max(self.now, due)
+            self.machine.handle_timeout(self.now)
+            assert self.machine.data_to_send() == b''
+        self.now = max(self.now, end)
+
+    def hear(self, data: bytes, *, from_far: bool = False, after: float = 0.001) -> None:
+        """Let bytes come."""
+        self.run(after)
+        self.machine.receive_data(
+            SecondPort(data) if from_far and self.has_two_ports else data, self.now)
+        assert self.machine.data_to_send() == b''
+
+    def play(self, chunks: Iterable[Chunk]) -> None:
+        """Let a recording come, each chunk at its time."""
+        begun: float | None = None
+        for chunk in chunks:
+            assert chunk.time is not None
+            begun = chunk.time if begun is None else begun
+            wait = max(0.0, 1.0 + chunk.time - begun - self.now)
+            self.hear(chunk.data, from_far=chunk.direction is Direction.IN, after=wait)
+
+    def values(self, mapping: Mapping) -> list[object]:
+        """Return all that was published of a row."""
+        return [*self.listener.values(mapping)]

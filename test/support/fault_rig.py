@@ -12,17 +12,22 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The node, the simulator, and a box between them that spoils their line."""
+"""
+The node, the simulator, and a box between them that spoils their line.
+
+The tests of a module share a rig, made anew after a test that has failed.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, ExitStack
 from pathlib import Path
 import signal
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from diagnostic_msgs.msg import DiagnosticStatus
+import pytest
 from std_msgs.msg import Float32MultiArray, Int16MultiArray
 from support.fault_box import FaultBox
 from support.ros import EVERYTHING, Observer, Process, ros_args, until_status, values_in
@@ -188,3 +193,38 @@ def boxed(observer: Observer, folder: Path, *assignments: str,
             observer, files, str(box.name), simulator, *assignments, name=name) as rig:
         rig.until_well()
         yield rig, box
+
+
+_Shared = TypeVar('_Shared')
+
+
+class Renewed(Generic[_Shared]):
+    """Lends one thing to test after test, so that one failure is one, and not a row of them."""
+
+    def __init__(self, make: Callable[[], AbstractContextManager[_Shared]]) -> None:
+        self._make = make
+        self._stack = ExitStack()
+        self._lent: list[_Shared] = []  # what there is now: one or nothing
+
+    @contextmanager
+    def lent(self, request: pytest.FixtureRequest) -> Iterator[_Shared]:
+        """Lend it to the test of ``request``."""
+        failed = request.session.testsfailed
+        if not self._lent:
+            self._lent.append(self._stack.enter_context(self._make()))
+        try:
+            yield self._lent[0]
+        except BaseException:
+            failed -= 1
+            raise
+        finally:
+            if request.session.testsfailed > failed:
+                self._lent.clear()
+                try:
+                    self._stack.close()
+                except AssertionError as error:  # its failure has been told
+                    print(error)
+
+    def close(self) -> None:
+        """End it, after the last test."""
+        self._stack.close()
