@@ -12,9 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What is said to read, write and identify, one request and reply after the other."""
+"""What is said to read, write and identify, one request and reply after the other, also long."""
 
 from collections.abc import Sequence
+from functools import partial
+from itertools import product
 
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.write import Outcome, Write, WriteResult
@@ -26,8 +28,10 @@ from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.slc.dialect import SlcDialect
 from abdf1_ros.pccc.steps import identify, words_in
+from abdf1_ros.settings.network import Network
 import pytest
 from support.cases import for_all
+from support.driver_bench import DriverBench
 from support.mappings import make_mapping
 
 STATUS = bytes.fromhex('00ee34490535 2f3033202020202020200000060000001000'.replace(' ', ''))
@@ -192,3 +196,29 @@ def test_refusal_of_a_long_read_names_the_column_that_makes_it_shorter() -> None
         with pytest.raises(RemoteError) as caught:
             words_in(reply(sts=0x10), parse_address('N7:0', PlcType.SLC), length, SlcDialect())
         assert str(caught.value).endswith('name it in the column Processor') is hint
+
+
+MODES = {'Message': {}, 'Standard': {'polling': 'Standard'}, 'Peer': {'mode': 'Peer'},
+         'Radio': {'mode': 'Radio'}}
+BAUDS = 1200, 2400, 4800, 9600, 19200, 38400
+TIMES = [*product((100, 300), (500, 1000))]  # Timeout and Cmd_Timeout
+LONGEST = 30.0  # s of line time
+REPLY_RECEIVED = 2523
+
+
+# Each mode and each speed meets all of these times in the first quarter of all lines.
+@pytest.mark.parametrize('quarter', [
+    0, *(pytest.param(number, marks=pytest.mark.long) for number in range(1, 4))])
+@pytest.mark.parametrize('mode', MODES)
+def test_long_replies_are_heard(mode: str, quarter: int) -> None:
+    lines = enumerate(BAUDS, [*MODES].index(mode) + quarter)
+    for (at, baud), words in product(lines, (10, 25, 40, 60, 80, 117)):
+        timeout, cmd_timeout = TIMES[at % 4]
+        row = make_mapping('N7:0', length=words)
+        bench = DriverBench([row], chunk=1, network=Network(
+            baud=baud, timeout=timeout, cmd_timeout=cmd_timeout, enq_retries=0, nak_retries=0,
+            **MODES[mode]))
+        bench.plc(1, 'PLC5', ('N7:0', words))
+        bench.run_until(partial(bench.listener.values, row), LONGEST)
+        # By radio a PLC waits for a quiet line, maybe for longer than Cmd_Timeout.
+        assert mode == 'Radio' or bench.listener.numbers() <= {REPLY_RECEIVED}

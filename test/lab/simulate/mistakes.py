@@ -24,7 +24,7 @@ log that the link waits for (test/ros/test_console.py, test/ports/test_trace.py)
 outside (test/ros/test_node.py, test/ros/test_lines.py), two masters on one line
 (test/ports/test_serial_device.py), and how long the process lets an end take
 (test/plan/test_plan_interlocks.py). Long replies at other speeds are for
-test/driver/test_slow_replies.py.
+test/driver/test_transactions.py.
 """
 
 from __future__ import annotations
