@@ -219,7 +219,8 @@ def test_what_counts_is_on_a_screen_of_80_by_24(simulator: Process) -> None:
     stream = pyte.Stream(screen)
     with terminal('--node', NODE, term='vt220', size=(24, 80)) as shown:
         end = time.monotonic() + PATIENCE
-        while not ('any age' in '\n'.join(screen.display) and '▁▁' in '\n'.join(screen.display)):
+        while not ('any age' in '\n'.join(screen.display) and '▁▁' in '\n'.join(screen.display)
+                   and screen.display[1].startswith('  load ')):  # diagnostics come later
             assert time.monotonic() < end, screen.display
             stream.feed(shown.new())
         told = [line.rstrip() for line in screen.display]
