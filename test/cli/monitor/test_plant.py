@@ -129,7 +129,7 @@ def test_spares_stand_beside_the_line_that_has_an_owner(
     nobody = 'no bridge has the line; waiting: '
     with PlantWatch([]) as watch:
         publish(watch, lambda lines: f'{nobody}alpha, gamma' in str(lines.get('/hall/b'))
-                and '/hall/a' in lines and lines['/hall/a'].spares,
+                and nobody not in str(lines.get('/hall/a', nobody)) and lines['/hall/a'].spares,
                 array('hall/a', link=OK, mappings=OK), *waiting)
         lines = {line.name: line for line in watch.lines()}
         assert lines['/hall/a'].spares == ['beta']
