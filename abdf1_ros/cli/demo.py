@@ -172,6 +172,7 @@ class Watcher(ObservingNode):
         self.values: dict[str, Values] = {}
         self.results: list[DiagnosticStatus] = []
         self.statuses: dict[str, DiagnosticStatus] = {}
+        self.taken: Counter[str] = Counter()
         self.missed: Counter[str] = Counter()
         for mapping in mappings:
             if mapping.reads:
@@ -182,15 +183,22 @@ class Watcher(ObservingNode):
         self.node.create_subscription(DiagnosticArray, '/diagnostics', self._diagnostics, 10)
 
     def expect(self, mapping: Mapping) -> float:
-        """Count missed deadlines of a topic; return the deadline that the bridge promises (s)."""
+        """
+        Count values and missed deadlines of a topic; return the promised deadline (s).
+
+        DDS counts from the first value on.
+        """
         topic = f'/abdf1/read/{mapping.topic}'
         deadline = self.node.get_publishers_info_by_topic(topic)[0].qos_profile.deadline
+
+        def taken(message: RosMessage) -> None:
+            self.taken[mapping.tag] += 1
 
         def missed(event: QoSRequestedDeadlineMissedInfo) -> None:
             self.missed[mapping.tag] += event.total_count_change
 
         self.node.create_subscription(
-            MESSAGES[mapping.message_type], topic, lambda message: None,
+            MESSAGES[mapping.message_type], topic, taken,
             QoSProfile(depth=1, deadline=deadline),
             event_callbacks=SubscriptionEventCallbacks(deadline=missed))
         return float(deadline.nanoseconds / 1e9)
@@ -301,7 +309,7 @@ class Stage:
     def _until_missed(self, tag: str, command: str, what: str) -> float:
         """Give the simulator a command that stops the values of a row; return the deadline (s)."""
         deadline = self._watcher.expect(self._mappings[tag])
-        self._pause(1.0)
+        self._wait(f'a value of {tag}', lambda: self._watcher.taken[tag] > 0)
         self._watcher.missed.clear()
         self._plcs.carry_out(command)
         self._wait(what, lambda: self._watcher.missed[tag] > 0)
