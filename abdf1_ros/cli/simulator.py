@@ -196,7 +196,6 @@ class Cast:
         self._on_lamp = on_lamp
         self._plcs = _load(options, self._tell_lamp)
         self._line = _make_line(options)
-        self._is_full_duplex = options.full_duplex is not None
         self._link = _make_thread(self._plcs, self._line, options, self._tell)
         self._check = options.check
 
@@ -217,7 +216,7 @@ class Cast:
     def carry_out(self, line: str) -> None:
         """Carry out a command, and print its result."""
         try:
-            self.say(execute(line, self._plcs, self._is_full_duplex, self.say))
+            self.say(execute(line, self._plcs, self.say))
         except CommandError as error:
             self.say(str(error))
         self._link.wake()
@@ -244,7 +243,7 @@ def _try_out(script: TimedCommands, options: argparse.Namespace) -> None:
     for _, line in script:
         try:
             if line.strip() != 'quit':
-                execute(line, plcs, options.full_duplex is not None)
+                execute(line, plcs)
         except CommandError as error:
             raise CommandError(f'--at: {error}') from None
 

@@ -87,7 +87,7 @@ class CommandError(Exception):
     """A text that is not a command; the message describes a right command."""
 
 
-def execute(line: str, plcs: Sequence[SimulatedPlc], is_full_duplex: bool = False,
+def execute(line: str, plcs: Sequence[SimulatedPlc],
             report: Callable[[str], None] = lambda text: None) -> str:
     """
     Carry out any command except "quit"; return a text about it, or raise CommandError.
@@ -96,7 +96,7 @@ def execute(line: str, plcs: Sequence[SimulatedPlc], is_full_duplex: bool = Fals
     """
     verb, *words = line.split()
     plc, arguments = _station(words, plcs)
-    if verb == 'msg' and is_full_duplex and len(arguments) > 1:
+    if verb == 'msg' and plc.processor.is_full_duplex and len(arguments) > 1:
         return _send(plc, arguments[0], arguments[1:], report)
     if verb == 'mode' and len(arguments) == 1:
         return _set_mode(plc, arguments[0])

@@ -512,8 +512,10 @@ def test_counters_are_told(plcs: list[SimulatedPlc]) -> None:
 def test_command_that_is_wrong_changes_nothing(
         plcs: list[SimulatedPlc], line: str, text: str) -> None:
     plcs[0].faults = before = InjectedFaults(slow=2)
+    if line.startswith('msg'):
+        plcs[0].be_full_duplex()
     with pytest.raises(CommandError) as caught:
-        execute(line, plcs, line.startswith('msg'))
+        execute(line, plcs)
     assert str(caught.value).startswith(text)
     assert plcs[0].faults is before
 
@@ -551,7 +553,8 @@ def test_mode_is_told_by_the_diagnostic_status(plcs: list[SimulatedPlc], setting
 
 def test_message_is_queued_and_its_end_reported(plcs: list[SimulatedPlc]) -> None:
     told: list[str] = []
-    assert execute('msg 12 N7:0 5 -6', plcs, True, told.append) == 'station 12: msg N7:0 5 -6'
+    plcs[1].be_full_duplex()
+    assert execute('msg 12 N7:0 5 -6', plcs, told.append) == 'station 12: msg N7:0 5 -6'
     assert told == []
     sending = plcs[1].outbox.pop()
     assert (sending.command.dst, sending.command.src) == (5, 12)
