@@ -242,7 +242,7 @@ def test_nothing_old_stays_below_a_table_that_shrinks(
     rows = SPEED, make_mapping('C5:0.ACC', item=2)
 
     def show(size: tuple[int, int], *news: tuple[Mapping, Values | NoValue]) -> list[str]:
-        monkeypatch.setattr('shutil.get_terminal_size', lambda: os.terminal_size(size))
+        monkeypatch.setattr('shutil.get_terminal_size', lambda **_: os.terminal_size(size))
         watch.note_changes([WatchedRead(NOW, *each) for each in news])
         watch.redraw()
         screen.take(capsys.readouterr().out)
