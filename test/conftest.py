@@ -30,8 +30,8 @@ from support.ptys import Pty
 
 # Files that wait for other processes most of the time, and files that compute; the longest first.
 _WAITING = (
-    'ros/test_process.py', 'faults/', 'cli/monitor/test_command.py', 'examples/', 'ros/',
-    'test_docs', 'test_', 'cli/')
+    'cli/plc/test_detect.py', 'ros/test_process.py', 'faults/', 'cli/monitor/test_command.py',
+    'examples/', 'ros/', 'cli/plc/test_other_lines.py', 'test_docs', 'test_', 'cli/')
 _COMPUTING = (
     'lab/simulate/', 'lab/noise/', 'df1/test_multidrop_line.py', 'lab/soak/',
     'driver/', 'df1/', 'lab/fuzz/', 'conform/', 'simulator/', 'sniffer/', 'tools/', 'plan/', '')
