@@ -56,8 +56,8 @@ def exactly(words: int, data: bytes) -> bytes:
 
 
 def whole_elements(layout: Layout, size: int) -> int:
-    """Return the words of as many whole elements as fit into ``size`` bytes."""
-    return size // 2 // layout.words * layout.words
+    """Return the words of the whole elements that fit into ``size`` bytes, at least of one."""
+    return max(1, size // 2 // layout.words) * layout.words
 
 
 class Dialect(ABC):

@@ -50,8 +50,12 @@ def requests_of(steps: Steps[object], *answers: Packet) -> list[str]:
 
 
 def test_packets_are_those_of_the_processor() -> None:
-    for processor, sizes in ((None, [236, 14]), (Processor.SLC_5_01, [82, 82, 82, 4])):
-        values = AddressedValues.of('N7:0', SLC, 125, processor=processor)
+    for kind, processor, sizes in (
+            ('int16', None, [236, 14]), ('int16', Processor.SLC_5_01, [82, 82, 82, 4]),
+            ('int32', Processor.SLC_5_01, [80] * 6 + [20]),
+            ('float32', Processor.ML1400, [204, 44])):
+        length = sum(sizes) // (2 if kind == 'int16' else 4)
+        values = AddressedValues.of('N7:0', SLC, length, ValueType(kind), processor=processor)
         found = requests_of(read(values), *(reply(bytes(size)) for size in sizes))
         assert [int(request.split()[1], 16) for request in found] == sizes
 

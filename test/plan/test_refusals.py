@@ -173,7 +173,8 @@ def test_row_that_fits_is_not_read_in_the_shorter_packets_of_another() -> None:
 
 def test_processor_that_is_exchanged_has_its_own_packets() -> None:
     refusals = Refusals(planner := Planner(LINE, 0.1))
-    blocks = planner.plan([make_mapping(f'N7:{word}', plc='SLC') for word in range(100)])
+    blocks = planner.plan([make_mapping(text, plc='SLC') for text in (
+        'ST9:0', *(f'N7:{word}' for word in range(100)))])  # a 5/01 has no string file
     assert refusals.processor_told(1, Processor.SLC_5_05, blocks) is None
     change = refusals.processor_told(1, Processor.SLC_5_01, blocks)
     assert change and max(block.words for block in change.new) <= 41
