@@ -42,6 +42,10 @@ _LOOK = 0.1
 # buffer.
 _OLD = 0.5
 
+# If the line needs more than these seconds for the bytes of some reads, they have waited in a
+# buffer.
+_BUFFERED = 0.3
+
 
 class SecondPort(bytes):
     """Bytes of the second port of a line that is heard on two ports."""
@@ -64,17 +68,33 @@ class ListeningMachine(Machine):
     """
     Give all bytes to ``listener``, and send none.
 
-    After a pause of this process the age of the first bytes is unknown: they are dropped.
+    After a pause of this process the age of the first bytes is unknown: they are dropped. So are
+    the bytes of a connection that come faster than the line brings them, until none are left.
     """
 
     listener: ByteListener
     _old_until = -math.inf
+    _is_old = False  # bytes have waited in a buffer
+    _has_more = False
+    _line_until = -math.inf  # when the bytes of the last reads end on the line
+
+    def came(self, count: int, now: float, *, has_more: bool) -> None:
+        """Judge whether the bytes of a read are old."""
+        was_old = self._is_old
+        self._line_until = max(self._line_until, now) + count * self.timing.char_time
+        self._is_old = (now < self._old_until or (was_old and self._has_more)
+                        or self._line_until > now + _BUFFERED)
+        self._has_more = has_more
+        if self._is_old:
+            self._line_until = now
+            if not was_old:
+                self.listener.forget(now)
 
     def receive_data(self, data: bytes, now: float) -> None:
         """Take bytes from the line."""
         self.now = now
         self.counters.chars_received += len(data)
-        if now >= self._old_until:
+        if now >= self._old_until and not self._is_old:
             self.listener.hear(data, now)
 
     def handle_timeout(self, now: float) -> None:

@@ -323,6 +323,13 @@ class Machine:
             if self._background is not None:
                 self._background.ended(error)
 
+    def came(self, count: int, now: float, *, has_more: bool) -> None:
+        """
+        Take notice of a read from a connection, whose bytes come with ``receive_data``, in parts.
+
+        ``has_more`` tells that the read may have left bytes unread.
+        """
+
     def receive_data(self, data: bytes, now: float) -> None:
         """Take bytes from the line."""
         self.now = now

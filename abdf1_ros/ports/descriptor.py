@@ -119,6 +119,7 @@ class DescriptorPort:
         os.set_blocking(descriptor, False)
 
     def read(self, timeout: float | None, wake: int) -> bytes:
+        self.has_more = False
         if wake != self._wake:
             self._poll.register(wake, select.POLLIN)
             self._wake = wake

@@ -341,6 +341,15 @@ def test_what_lay_in_a_buffer_while_the_process_stood_still_is_dropped() -> None
     assert bench.values(mapping) == [[1, 2, 3, 4]]
 
 
+def test_what_comes_faster_than_the_line_brings_it_is_old_until_nothing_is_left() -> None:
+    bench, mapping = listening()
+    for tns, (count, has_more, heard) in enumerate((
+            (40, False, 1), (1000, True, 1), (512, True, 1), (40, False, 1), (40, False, 2))):
+        bench.machine.came(count, bench.now, has_more=has_more)
+        bench.hear(frame(command(tns, READ_N7_0), 1) + frame(reply(tns, VALUES)))
+        assert len(bench.values(mapping)) == heard
+
+
 def test_row_that_no_node_reads_is_named_after_each_opening() -> None:
     mapping = row()
     bench = ListeningBench([mapping])

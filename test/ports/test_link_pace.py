@@ -249,7 +249,9 @@ def test_connection_that_babbles_leaves_time_to_others(
         work: float, host: float, rest: float) -> None:
     script = Script(Listen(None), timing=LineTiming(0.001))
     thread = Restful(script, Babbler(bytes(READ_SIZE), 11, quiet=6), work=work, host=host)
+    script.machine.came = came = Mock()  # type: ignore[method-assign]
     thread.run_out()
+    assert [call.args[0] for call in came.call_args_list] == [READ_SIZE] * 10
     assert thread.taken == [*[64] * 4 * 8, READ_SIZE, *[64] * 5 * 8]
     del thread.rests[4 * 8]  # after the work of the read before it too
     assert thread.rests == [pytest.approx(rest)] * 71
