@@ -113,10 +113,12 @@ class MasterLine:
         self.begin()
 
     def begin(self) -> None:
-        """Forget messages that wait to be passed on."""
+        """Forget messages that wait to be passed on, and the last message of each station."""
         self.forwards: deque[Packet] = deque()
         # Commands between slaves, whose replies are passed on as well.
         self._passed_on: deque[Packet] = deque(maxlen=_MOST_PASSED_ON)
+        for station in self.stations.records.values():
+            station.forget_last()
 
     def deliver(self, number: int, packet: Packet, expires: float = math.inf,
                 reflex: Reflex | None = None, answer_within: float = math.inf

@@ -91,6 +91,10 @@ class Station:
         self.last_key = key
         return True
 
+    def forget_last(self) -> None:
+        """Treat the next message as new, whatever its numbers."""
+        self.last_key = self.last_refused = None
+
     def repeats(self, packet: Packet) -> bool:
         """Tell whether ``packet`` is a repetition of the last message."""
         return (packet.dst, *packet.duplicate_key) == self.last_key

@@ -135,6 +135,16 @@ def test_replies_to_two_nodes_with_one_number_are_no_repetition(standard: bool) 
     assert 'duplicate_messages' not in rig.master.counts()
 
 
+def test_start_forgets_the_last_message_of_each_station() -> None:
+    """A processor counts from 0 after it was without power, and some programs always send 0."""
+    rig = bench(True, 7)
+    for _ in range(2):
+        rig[7].outbox.append(Packet(MASTER, 7, 0x0F, 0, 0, b'first'))
+        rig.start()
+        rig.run(0.2)
+    assert [packet.tns for packet in rig.master.served] == [0, 0]
+
+
 @BOTH
 def test_start_forgets_what_waited_to_be_passed_on(standard: bool) -> None:
     rig = bench(standard, 7, 8)
