@@ -163,7 +163,7 @@ class RowReader:
     def _name(self, column: str, text: str) -> str:
         name = sanitise(text)
         if not name:
-            self._bad_value(column, 'has no letter, digit or underscore')
+            self._bad_value(column, 'has no letter or digit')
         elif len(name) > MAX_LENGTH:
             self._fault(column, f'{column} has {len(name)} characters, at most {MAX_LENGTH} are '
                                 'allowed')

@@ -211,8 +211,8 @@ def test_command_says_whether_a_row_reads_and_writes(text: str, reads: bool, wri
      'character 1 is U+0661 ARABIC-INDIC DIGIT ONE'),
     ({'Max': 'inf'}, '12 (Max): Item: 1, Max = "inf" should be a number'),
     ({'Max': '1e999'}, '12 (Max): Item: 1, Max = "1e999" should be a number'),
-    ({'Tag': '--'}, '1 (Tag): Item: 1, Tag = "--" has no letter, digit or underscore'),
-    ({'Topic': '/'}, '8 (Topic): Item: 1, Topic = "/" has no letter, digit or underscore'),
+    ({'Tag': '--'}, '1 (Tag): Item: 1, Tag = "--" has no letter or digit'),
+    ({'Topic': '/'}, '8 (Topic): Item: 1, Topic = "/" has no letter or digit'),
     ({'Topic': 'x' * 151}, '8 (Topic): Item: 1, Topic has 151 characters, at most 150 are '
      'allowed'),
     *(({column: ''}, f'{COLUMNS.index(column) + 1} ({column}): Item: 1, {column} is missing')

@@ -60,7 +60,7 @@ _NO_FILE_NEEDED = (
 _LETTERS = re.compile(
     r'[#$]?(?P<type>[A-Z]{1,2})(?P<file>\d{1,9})?[:;](?P<number>\d{1,9})'
     r'(?:\.(?P<member>[A-Z]{2,3}|\d))?(?:/(?P<bit>[A-Z]{2}|\d{1,3}))?', re.ASCII)
-_LEVELS = re.compile(r'E(\d{1,5}(?:\.\d{1,5}){5})(?:/(\d{1,3}))?', re.ASCII)
+_LEVELS = re.compile(r'[#$]?E(\d{1,5}(?:\.\d{1,5}){5})(?:/(\d{1,3}))?', re.ASCII)
 
 
 class _Plc3Addressing(Addressing):

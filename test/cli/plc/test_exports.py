@@ -124,7 +124,7 @@ def test_tag_of_kepserver_becomes_a_row(
     ('"Meter","400101",Word,1,RO,100,,,,,,,,,,"",',
      'write type, file, ":", element, as in N7:0, B3:1/5, T4:0.ACC or I:1.0/3'),
     ('"Empty","",Word,1,RO,100,,,,,,,,,,"",', 'Address is missing'),
-    ('"---","N7:0",Word,1,RO,100,,,,,,,,,,"",', 'Tag = "---" has no letter, digit or underscore'),
+    ('"---","N7:0",Word,1,RO,100,,,,,,,,,,"",', 'Tag = "---" has no letter or digit'),
     ('"Speed%","N7:5",Word,1,RO,100,,,,,,,,,,"",', 'the name Speed is that of line 2')])
 def test_tag_that_cannot_be_used_is_left_out_and_stays_as_a_comment(
         tmp_path: Path, row: str, expected: str) -> None:
