@@ -19,6 +19,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
+from abdf1_ros.df1.packet import is_local_status
 from abdf1_ros.errors import FormatError, RemoteError
 from abdf1_ros.pccc.address import Address, Addressing
 from abdf1_ros.pccc.dialect import Dialect, Steps
@@ -60,13 +61,20 @@ class FileSearch(Protocol):
 
 
 def is_there(address: Address, dialect: Dialect) -> Steps[bool]:
-    """Tell whether a read of an element succeeds."""
+    """Tell whether a read of an element succeeds; raises RemoteError of a node on the way."""
     words = address.layout.words
     try:
         dialect.read_data(address, words, check_status((yield dialect.read(address, words))))
-    except (RemoteError, FormatError):
+    except (RemoteError, FormatError) as error:
+        check_way(error)
         return False
     return True
+
+
+def check_way(error: RemoteError | FormatError) -> None:
+    """Raise an error of a node on the way, which does not tell what the PLC has."""
+    if isinstance(error, RemoteError) and is_local_status(error.sts):
+        raise error
 
 
 def counted(addressing: Addressing, dialect: Dialect, kind: FileType, number: int,

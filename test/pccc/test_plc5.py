@@ -15,7 +15,7 @@
 """A PLC-5: its commands, byte for byte, requests and replies, and an emulated one."""
 
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.errors import FormatError
+from abdf1_ros.errors import FormatError, RemoteError
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.families import FAMILIES, parse_address
@@ -235,3 +235,6 @@ def test_files_of_a_plc_5_80_are_counted_to_their_end() -> None:
         while True:
             request = steps.send(Server(there).serve(Packet(1, 0, 0x0F, 0, 7, request[1])))
     assert done.value.value == DataFile(FileType.INTEGER, 12, 1500)
+    next(steps := Plc5FileSearch().look_for(12))
+    with pytest.raises(RemoteError, match='STS 02'):  # a gateway that has lost the PLC
+        steps.send(Packet(1, 0, 0x4F, 2, 7))

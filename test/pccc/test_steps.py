@@ -76,6 +76,8 @@ def test_refused_or_odd_reply_is_no_file_and_leaves_an_identity_as_it_was() -> N
     for odd in (reply(b'\1'), reply(sts=0x10)):
         assert len(requests_of(is_there(values.address, values.dialect), odd)) == 1
         assert len(requests_of(identify(), reply(FAULTED), odd)) == 2  # an old PLC-5
+    with pytest.raises(RemoteError, match='STS 02'):  # a gateway has lost its PLC
+        requests_of(is_there(values.address, values.dialect), reply(sts=0x02))
 
 
 def test_echo_is_what_was_sent() -> None:

@@ -46,7 +46,8 @@ def find_files(session: Session, station: int, plc_type: PlcType, processor: Pro
     Yield the files among ``numbers``: from the processor's own list, or found by reads.
 
     ``show`` gets a text about the present file, ``warn`` the reason why no list is used. Raises
-    LinkError, and FormatError for a family without a way to find files.
+    LinkError, RemoteError of a node on the way, and FormatError for a family without a way to find
+    files.
     """
     family = FAMILIES[plc_type]
     search = family.file_search

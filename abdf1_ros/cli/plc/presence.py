@@ -205,7 +205,11 @@ def understands(session: Session, station: int) -> bool:
 
 
 def io_access(session: Session, there: Presence) -> list[str]:
-    """Return the Access values that read inputs of an SLC or MicroLogix; raises LinkError."""
+    """
+    Return the Access values that read inputs of an SLC or MicroLogix.
+
+    Raises LinkError, and RemoteError of a node on the way.
+    """
     kind = there.identity.plc_type if there.identity else None
     ways = () if kind is None else FAMILIES[kind].accesses
     if kind is None or Access.FLAT not in ways:

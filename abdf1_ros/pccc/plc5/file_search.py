@@ -19,7 +19,7 @@ from __future__ import annotations
 from abdf1_ros.errors import FormatError, RemoteError
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.dialect import Steps
-from abdf1_ros.pccc.file_search import counted, DataFile
+from abdf1_ros.pccc.file_search import check_way, counted, DataFile
 from abdf1_ros.pccc.file_types import DEFAULT_FILES, FileType
 from abdf1_ros.pccc.plc5.address import ADDRESSING, FILES
 from abdf1_ros.pccc.plc5.dialect import PLC5_TYPED
@@ -40,7 +40,8 @@ class Plc5FileSearch:
         start = Address(ADDRESSING, FileType.INTEGER, number, 0)
         try:
             kind = _kind(number, TypedData.decode(check_status((yield PLC5_TYPED.read(start, 1)))))
-        except (RemoteError, FormatError):
+        except (RemoteError, FormatError) as error:
+            check_way(error)
             return None
         if kind is None or kind.is_io:
             return kind and DataFile(kind, number, 0)

@@ -35,7 +35,7 @@ from abdf1_ros.cli.plc.options import (
 )
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.cli.terminal import called, colour, EXIT_FAILED, GREEN
-from abdf1_ros.errors import LinkError
+from abdf1_ros.errors import LinkError, RemoteError
 
 _BEHIND_GATEWAY = (
     'a gateway: each PLC behind it has a node number. If a scan with --via finds no node, scan '
@@ -59,7 +59,7 @@ def run(options: argparse.Namespace) -> int:
     there = found.presence
     print(f'{colour(str(found.settings), GREEN, sys.stdout)}: station {there.station} {there}')
     settings = found.settings
-    with Session(found.settings.on(network)) as session, suppress(LinkError):
+    with Session(found.settings.on(network)) as session, suppress(LinkError, RemoteError):
         if ways := presence.io_access(session, there):
             print(f'inputs and outputs: Access {" or ".join(ways)}')
     if there.is_of_gateway:
