@@ -229,7 +229,7 @@ def _folder(options: argparse.Namespace) -> tuple[str, bool]:
     for name, net, map_file in lines:
         found = examine(str(net), str(map_file), options.default_period / 1000)
         # If the net file has no port, a parameter gives it.
-        if found.network is not None and found.network.com_port != Network().com_port:
+        if found.network is not None and found.network.names_port:
             for port in found.network.ports:
                 owner = owners.setdefault(line_of(port), name)
                 if owner != name:

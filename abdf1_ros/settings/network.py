@@ -218,6 +218,11 @@ class Network:
         return _device(self.listen_port) if self.line_mode.only_listens else ''
 
     @property
+    def names_port(self) -> bool:
+        """Tell whether the net file names the port; if not, a remark says so."""
+        return all(remark.place.column != 'Com_Port' for remark in self.remarks)
+
+    @property
     def ports(self) -> tuple[str, ...]:
         """Return the port of the line, and the second port if there is one."""
         return (self.port, self.second_port) if self.second_port else (self.port,)

@@ -293,8 +293,8 @@ def test_output_that_cannot_take_it_is_no_traceback(files: Paths) -> None:
 
 def plant(folder: Path, **lines: tuple[str, str]) -> None:
     """Write the files of many lines."""
-    for name, (net, row) in lines.items():
-        write_csv(folder / f'{name}_net.csv', NET_HEADER, [net])
+    for port, (name, (net, row)) in enumerate(lines.items(), 2):
+        write_csv(folder / f'{name}_net.csv', NET_HEADER, [f'{net.removesuffix(",1")},{port}'])
         write_csv(folder / f'{name}_map.csv', MAP_HEADER, [row])
 
 
@@ -310,13 +310,13 @@ def test_folder_has_a_line_of_text_for_each_pair(tmp_path: Path, capsys: Output)
     assert [line.partition(':')[0] for line in lines] == ['glue', 'hall/paint', 'press', '3 lines']
     assert lines[-1] == \
         '3 lines: 3 good (0 of them with warnings), 0 with errors; not part of a line: notes.csv'
-    assert lines[0].startswith('glue: 1 row, port /dev/ttyS0, poll cycle ')
+    assert lines[0].startswith('glue: 1 row, port /dev/ttyS2, poll cycle ')
     assert lines[1] == 'hall/paint: 1 row, port /dev/ttyS0, load 7%'
 
 
 def test_lines_stand_in_the_order_of_their_numbers(tmp_path: Path, capsys: Output) -> None:
-    for name in ('line10_', 'line2.', 'line1-'):
-        write_csv(tmp_path / f'{name}net.csv', NET_HEADER, [GOOD_NET])
+    for port, name in enumerate(('line10_', 'line2.', 'line1-'), 1):
+        write_csv(tmp_path / f'{name}net.csv', NET_HEADER, [f'{GOOD_NET[:-1]}{port}'])
         write_csv(tmp_path / f'{name}map.csv', MAP_HEADER, [GOOD_ROW])
     (tmp_path / 'line1_map.csv').write_text('one too many')
     (tmp_path / 'line2.map.csv').rename(tmp_path / 'line2_map.csv')
@@ -338,7 +338,7 @@ def test_error_of_one_pair_is_named_and_the_others_are_told(
 
 
 def test_two_lines_of_a_folder_on_one_port_are_an_error(tmp_path: Path, capsys: Output) -> None:
-    for name, port in (('glue', '/dev/ttyUSB0'), ('paint', 'socket://localhost:4001'),
+    for name, port in (('dryer', '1'), ('glue', '/dev/ttyUSB0'), ('oven', '/dev/ttyS0'), ('paint', 'socket://localhost:4001'),
                        ('press', 'rfc2217://127.1:4001')):
         write_csv(tmp_path / f'{name}_net.csv', NET_HEADER, [f'{GOOD_NET[:-1]}{port}'])
         write_csv(tmp_path / f'{name}_map.csv', MAP_HEADER, [GOOD_ROW.replace('1000', '10')])
@@ -347,13 +347,16 @@ def test_two_lines_of_a_folder_on_one_port_are_an_error(tmp_path: Path, capsys: 
     assert main([str(tmp_path)]) == 2
     times = 'poll cycle 74 ms, load 742%, 2 warnings'
     assert capsys.readouterr().out.splitlines() == [
+        f'dryer: 1 row, port /dev/ttyS0, {times}',
         f'glue: 1 row, port /dev/ttyUSB0, {times}',
+        f'oven: error: {tmp_path}/oven_net.csv: /dev/ttyS0 is the port of dryer too',
+        f'oven: 1 row, port /dev/ttyS0, {times}',
         f'paint: 1 row, port socket://localhost:4001, {times}',
         f'press: error: {tmp_path}/press_net.csv: rfc2217://127.1:4001 is the port of paint too',
         f'press: 1 row, port rfc2217://127.1:4001, {times}',
         f'tap: error: {tmp_path}/tap_net.csv: /dev/ttyUSB0 is the port of glue too',
         'tap: 1 row, port /dev/ttyS6, nothing is sent',
-        '4 lines: 2 good (2 of them with warnings), 2 with errors']
+        '6 lines: 3 good (3 of them with warnings), 3 with errors']
 
 
 def test_json_of_a_folder(tmp_path: Path, capsys: Output) -> None:
