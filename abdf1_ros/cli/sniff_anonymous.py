@@ -106,7 +106,7 @@ def _net_rows(rows: list[Row]) -> list[list[str]]:
 def _net_cell(column: str, text: str, kind: ValueKind[object]) -> str:
     if not text:
         return ''
-    if column == 'Com_Port':
+    if column in ('Com_Port', 'Listen_Port'):
         scheme = text.partition('://')[0]
         return scheme if scheme in DEVICE_SERVERS else 'device'
     if column == 'Share':

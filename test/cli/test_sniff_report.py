@@ -104,8 +104,8 @@ def test_anonymous_bundle_has_no_values_and_no_names(tmp_path: Path, capture: st
 
 NET = """\
 # Joe's line, ask jdoe
-Com_Port,Station,Baud,Mode,Share,Store_Forward,Timeout
-rfc2217://plc-gw.acme.example:4001,5,9600,Master,pty:/home/jdoe/hmi tcp:10.1.2.3:4002,jdoe,jdoe
+Com_Port,Station,Baud,Mode,Share,Store_Forward,Timeout,Listen_Port
+rfc2217://plc-gw.acme.example:4001,5,9600,Master,pty:/home/jdoe/hmi tcp:10.1.2.3:4,jdoe,jdoe,/acme
 """
 MAP = """\
 sep=,
@@ -151,8 +151,8 @@ def test_anonymous_bundle_has_no_name_of_a_host_user_path_or_port(
     everything = '\n'.join([*found, *found.values()]).lower()
     assert [name for name in NAMES if name in everything] == []
     assert found['settings/net.csv'] == (
-        'Station,Mode,Com_Port,Baud,Timeout,Share,Store_Forward\n'
-        '5,Master,rfc2217,9600,?,2 places,?\n')
+        'Station,Mode,Com_Port,Baud,Timeout,Share,Store_Forward,Listen_Port\n'
+        '5,Master,rfc2217,9600,?,2 places,?,device\n')
     assert found['settings/map.csv'] == found['settings/1_map.csv'] == (
         'Tag,Command,Address,Station,PLC_Type,Topic,Min,While,Confirms,Via\n'
         'tag_1,Read,N7:0,2,SLC,,,,,\n'
