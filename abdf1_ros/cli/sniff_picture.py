@@ -110,7 +110,10 @@ class _Drawing:
         """Return the time of day; empty if unknown."""
         if self.begun is None or self.unit != 's':
             return ''
-        return (self.begun + timedelta(seconds=place)).strftime('%H:%M:%S')
+        try:
+            return (self.begun + timedelta(seconds=place)).strftime('%H:%M:%S')
+        except OverflowError:  # beyond the years that a date can have
+            return ''
 
     def name(self, strip: int) -> str:
         """Return the target of links to a strip."""

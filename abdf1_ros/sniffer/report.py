@@ -24,7 +24,7 @@ from abdf1_ros.pccc.describe import command_name
 from abdf1_ros.sniffer.capture import Direction
 from abdf1_ros.sniffer.entries import Entry, Kind, Mark
 from abdf1_ros.sniffer.summary import Counts, Summary
-from abdf1_ros.text import counted, in_ms
+from abdf1_ros.text import counted, in_ms, printable
 
 _RED, _YELLOW, _FAINT, _PLAIN = '\x1b[31m', '\x1b[33m', '\x1b[2m', '\x1b[0m'
 _BAD = (Kind.DAMAGED, Kind.UNANSWERED, Kind.UNKNOWN, Kind.NOISE)
@@ -43,7 +43,7 @@ def text_line(entry: Entry, colour: bool = False) -> str:
 
 def words(entry: Entry) -> str:
     """Return text, guest, check, latency and marks of an entry."""
-    guest = f'guest {entry.guest}' if entry.guest else ''
+    guest = f'guest {printable(entry.guest)}' if entry.guest else ''
     latency = '' if entry.latency is None else f'{entry.latency * 1000:.1f} ms'
     marks = (mark.value.upper() for mark in entry.marks)
     return ' | '.join(filter(None, (entry.text, guest, _check(entry), latency, *marks)))

@@ -50,7 +50,7 @@ NOISE = Entry(3.0, IN, Kind.NOISE, '2 bytes outside of any frame', size=2)
     (DAMAGED, '     2.000000 <   1 damaged  wrong check | BCC BAD'),
     (POLL, '            - ?  16 poll     BCC good'),
     (NOISE, '     3.000000 <     noise    2 bytes outside of any frame'),
-    (Entry(0.0, IN, Kind.ACK, station=1), '     0.000000 <   1 ACK')])
+    (Entry(0.0, IN, Kind.ACK, guest='\x1b[2J'), '     0.000000 <     ACK      guest \\x1b[2J')])
 def test_entry_has_its_line_of_text(entry: Entry, text: str) -> None:
     assert text_line(entry) == text
 
