@@ -32,7 +32,7 @@ also after Ctrl-C.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 import math
 import os
@@ -104,7 +104,12 @@ examples:
 
 
 class Output:
-    """Decode chunks and print the entries."""
+    """
+    Decode chunks and print the entries.
+
+    If the output fails, or its reader leaves, all other files are written all the same.
+    ``is_unread`` then tells that the reader has left, and ``has_failed`` that a file failed.
+    """
 
     def __init__(self, options: argparse.Namespace) -> None:
         self._options = options
@@ -116,6 +121,7 @@ class Output:
         self._timeline = _timeline(options) if options.html else None
         self._packets = PcapngWriter(options.pcapng) if options.pcapng else None
         self.has_failed = False
+        self.is_unread = False
         self._colour = sys.stdout.isatty() and 'NO_COLOR' not in os.environ
         self._shows_progress = sys.stderr.isatty() and (options.summary or not sys.stdout.isatty())
         self._next_progress = time.monotonic() + PROGRESS_PERIOD
@@ -198,10 +204,25 @@ class Output:
         """Print the summary."""
         session = self.begin({})
         if self._options.json:
-            print(summary_json(self._summary, session.kind))
+            self._write(summary_json(self._summary, session.kind))
         else:
-            print('\n'.join(summary_lines(self._summary, session.kind)))
-        sys.stdout.flush()
+            self._write('\n'.join(summary_lines(self._summary, session.kind)))
+        self.flush()
+
+    def flush(self) -> None:
+        """Hand what has been printed to its reader."""
+        self._try(sys.stdout.flush)
+
+    def _write(self, text: str) -> None:
+        self._try(partial(print, text))
+
+    def _try(self, work: Callable[[], None]) -> None:
+        """Print; drop all output from the first error on."""
+        try:
+            work()
+        except OSError as error:
+            self.is_unread = has_reader_left(error, _say)
+            self.has_failed |= not self.is_unread
 
     def _print(self, entry: Entry) -> None:
         self._summary.add(entry)
@@ -216,9 +237,9 @@ class Output:
                 self.has_failed = True
                 _say(f'{reason_of(self._options.pcapng, error)}; no more packets are written')
         if self._options.json and not self._options.summary:
-            print(json_line(entry))
+            self._write(json_line(entry))
         elif not self._options.summary:
-            print(text_line(entry, self._colour))
+            self._write(text_line(entry, self._colour))
 
 
 # Modules that only a few calls need are imported there. Their import takes as long as all other
@@ -341,7 +362,7 @@ def _decode_files(options: argparse.Namespace, output: Output) -> int:
     try:
         _take_files(options, output)
     except KeyboardInterrupt:  # also during a read of a pipe without a writer
-        output.sum_up()
+        output.end()
     except Problem as problem:
         status = EXIT_USAGE
         _say(str(problem))
@@ -362,6 +383,8 @@ def _take_files(options: argparse.Namespace, output: Output) -> None:
                 return
             has_bytes = True
             output.take(chunk, recording.settings)
+            if output.is_unread and not (options.html or options.report or options.pcapng):
+                return
             output.show_progress(f'{name}: {recording.percent} %' if recording.has_size else name)
         if not has_bytes:
             _say(f'{name}: the file has no bytes')
@@ -430,16 +453,13 @@ def _print_heard(tap: Tap, trace: Trace | None, output: Output, settings: dict[s
             break
         if trace:
             trace.write(chunk)
-        try:
-            output.take(chunk, settings)
-            sys.stdout.flush()
-        except OSError as error:
-            if not has_reader_left(error, _say):
-                status = EXIT_USAGE
-            elif not options.tap:
+        was_unread = output.is_unread
+        output.take(chunk, settings)
+        output.flush()
+        if output.is_unread and not was_unread:
+            if not options.tap:
                 break
-            else:
-                _say('this output is no longer read; the bytes are passed on until Ctrl-C')
+            _say('this output is no longer read; the bytes are passed on until Ctrl-C')
         _tell_lost(tap, trace)
         idle()
     if trace:

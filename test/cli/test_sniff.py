@@ -474,6 +474,14 @@ def test_reader_that_leaves_does_not_cut_a_tap(
     assert b''.join(chunk.data for chunk in chunks) == (1 + 2 * goes_on) * (SAID[0] + SAID[1])
 
 
+def test_page_is_whole_though_nobody_reads_the_output(tmp_path: Path, capture: str) -> None:
+    page = tmp_path / 'line.html'
+    sniff = Forked('sniff', ['--html', str(page), capture])
+    sniff.stdout.close()
+    assert sniff.wait(PATIENCE) == 0
+    assert '</html>' in page.read_text('utf-8')
+
+
 @pytest.mark.parametrize('args, text', [
     (('ttyUSB0',), 'did you mean --port ttyUSB0? A FILE is a recording'),
     (('/dev/ttyUSB99',), 'did you mean --port /dev/ttyUSB99? A FILE is a recording'),
