@@ -93,7 +93,7 @@ def to_read(options: argparse.Namespace) -> Targets:
         if not entries:
             of = '' if options.station is None else f' of station {options.station}'
             raise ConfigurationError([Problem(options.map, f'has no row{of} that is read')])
-    routes = _routes(mappings)
+    routes = routes_of(mappings)
     gateway = routes.get(station := _station(options), station)
     if options.via is None and gateway != station:
         cells['Via'] = str(gateway)
@@ -118,7 +118,7 @@ def to_write(options: argparse.Namespace) -> Targets:
     if options.map:
         mappings = rows_of_map(options.map)
         row = _row_to_write(mappings, options.map, options.address)
-        targets = Targets([row], {}, routes=_routes(mappings))
+        targets = Targets([row], {}, routes=routes_of(mappings))
         _check_options(options, targets)
         with no_value(options.address):
             data.Writing(targets.rows[0], options.values)
@@ -161,7 +161,8 @@ def _cells(options: argparse.Namespace, command: Command, length: int | str | No
     return {column: text for column, text in given.items() if text}
 
 
-def _routes(mappings: Rows) -> dict[int, int]:
+def routes_of(mappings: Rows) -> dict[int, int]:
+    """Return the gateway of each station; a station on the line itself is its own."""
     return {row.station: row.station if row.via is None else row.via for row in mappings.of_plcs}
 
 

@@ -253,6 +253,8 @@ def test_rows_of_a_map_that_lie_outside_of_the_files(
             ('1', '--files', '31-40'), 'all rows of station 1 in these files lie inside\n')):
         assert main(['files', *args, *line]) == ('file 12' in told)
         assert capsys.readouterr().out == told
+    assert main(['files', '9', *line]) == 2
+    assert capsys.readouterr().err == f'plc: {path}: has no row of a file of station 9\n'
 
 
 def test_directory_takes_few_reads(port: str, capsys: Output) -> None:
@@ -281,8 +283,9 @@ def test_plc_behind_a_gateway(tmp_path: Path, capsys: Output) -> None:
         assert stored(plc, 'N7:1') == b'\x2B\0'
         capsys.readouterr()
         assert main(['files', '2', '--files', '2-10', '--map', *line]) == 0
-    path = tmp_path / 'map.csv'
-    path.write_text(capsys.readouterr().out, encoding='utf-8')
+        path = tmp_path / 'map.csv'
+        path.write_text(capsys.readouterr().out, encoding='utf-8')
+        assert main(['files', '2', '--map', str(path), '--port', name]) == 0
     mappings, problems = load_mappings(str(path))
     assert problems == []
     assert {(mapping.station, mapping.via) for mapping in mappings} == {(2, 10)}

@@ -29,9 +29,10 @@ from abdf1_ros.cli.plc import data, files
 from abdf1_ros.cli.plc.asking import ask, family_of
 from abdf1_ros.cli.plc.options import add_plc_type, add_station, stations_option
 from abdf1_ros.cli.plc.session import complain, Session
-from abdf1_ros.cli.plc.targets import rows_of_map
+from abdf1_ros.cli.plc.targets import routes_of, rows_of_map, Targets
 from abdf1_ros.cli.terminal import EXIT_FAILED, Progress
 from abdf1_ros.pccc.file_search import DataFile
+from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings.rows import Rows
 
 
@@ -49,12 +50,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Ask the station for its files; print them, rows for them, or faults of a map."""
-    return ask(options, partial(_files, mappings=rows_of_map(options.map)))
+    mappings = rows_of_map(options.map)
+    return ask(options, partial(_files, mappings=mappings),
+               Targets([], {}, routes=routes_of(mappings)))
 
 
 def _files(options: argparse.Namespace, session: Session, mappings: Rows) -> int:
-    family, processor = family_of(options, session)
     numbers, rows = options.files, files.in_files(mappings, options.station)
+    if options.map and not rows:
+        raise ConfigurationError([Problem(
+            options.map, f'has no row of a file of station {options.station}')])
+    family, processor = family_of(options, session)
     if options.map:  # only these files are looked for, and only their rows are judged
         rows = [row for row in rows if numbers is None or row.address.file in numbers]
         numbers = sorted({row.address.file for row in rows})
