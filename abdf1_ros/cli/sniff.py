@@ -68,7 +68,7 @@ from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings import BAUD_RATES, PARITIES
 from abdf1_ros.settings.network import Network, URLS
 from abdf1_ros.signals import limit_output
-from abdf1_ros.sniffer.capture import Chunk
+from abdf1_ros.sniffer.capture import Chunk, LOST
 from abdf1_ros.sniffer.dumps import Recording
 from abdf1_ros.sniffer.entries import Entry
 from abdf1_ros.sniffer.pcapng import PcapngWriter
@@ -382,6 +382,9 @@ def _take_files(options: argparse.Namespace, output: Output) -> None:
             if time.monotonic() >= end:
                 return
             has_bytes = True
+            if lost := recording.settings.pop(LOST, ''):
+                _say(f'{name}: the recorder has lost lines before {chunk.time} s: {lost}. '
+                     'Faults of the line there may be no faults')
             output.take(chunk, recording.settings)
             if output.is_unread and not (options.html or options.report or options.pcapng):
                 return
@@ -473,7 +476,7 @@ def _tell_lost(tap: Tap, trace: Trace | None) -> None:
         text = f'{counted(lost, "piece")} of traffic lost: this output was too slow'
         _say(text)
         if trace:
-            trace.write(f'# {text}')
+            trace.write(f'# {LOST}: {text}')
 
 
 _say = partial(tell, 'sniff')

@@ -29,7 +29,7 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.ports.descriptor import Port, PortAround
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.settings import PortSettings
-from abdf1_ros.sniffer.capture import CaptureWriter, Chunk, Direction, setting_line
+from abdf1_ros.sniffer.capture import CaptureWriter, Chunk, Direction, LOST, setting_line
 
 # Most chunks that wait for the disk: some minutes of a busy line.
 MOST_WAITING = 10_000
@@ -93,7 +93,7 @@ class Trace:
     def _tell_lost(self) -> None:
         if lost := self._lost - self._told:
             self._told += lost
-            self._writer.write(f'# lines lost here: {lost}; the disk was too slow')
+            self._writer.write(f'# {LOST}: {lost}; the disk was too slow')
             self._on_error(f'{self._path}: the disk was too slow; lines lost: {lost}')
 
 

@@ -27,7 +27,8 @@ A capture is ASCII, one line for each chunk of bytes as it was read or written::
 
 The first line gives the version of the format. Other lines with ``#`` are settings ("name: value")
 or remarks, at any place. The setting "guest: A40E pty:/tmp/hmi" says that the next command with
-TNS A40E is from the guest at pty:/tmp/hmi (column Share).
+TNS A40E is from the guest at pty:/tmp/hmi (column Share). The setting "lines lost here" tells that
+the recorder was too slow for all bytes before the next chunk.
 
 A chunk has the seconds since ``begun``, its direction, and its bytes in hexadecimal. Directions:
 
@@ -49,6 +50,7 @@ from abdf1_ros.problems import Problem
 from abdf1_ros.text import printable
 
 VERSION = 1
+LOST = 'lines lost here'
 _MAGIC = '# abdf1_ros capture'
 _FIRST_LINE = f'{_MAGIC} {VERSION}'
 # Times (s) from here on are refused; it is more than the seconds since 1970.

@@ -393,6 +393,8 @@ def test_what_a_slow_output_has_lost_is_told_and_saved(
                    for lost in ('1 piece', '3 pieces'))
     assert capsys.readouterr().err.endswith(f'sniff: {first}sniff: {told}')
     assert (tmp_path / 'saved').read_text('ascii').endswith(told)
+    assert main([str(tmp_path / 'saved')]) == 0
+    assert f'lost lines before 0.1 s: {first[:-1]}. Faults' in capsys.readouterr().err
     assert made.call_args.args[1].parity == 'Even'
     assert '# baud: 9600\n' in (tmp_path / 'saved').read_text('ascii')
     tap.new_losses = Mock(return_value=0)

@@ -40,7 +40,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_addresses(parser)
     parser.add_argument('--period', default=0.5, metavar='S',
                         type=number_option('seconds from 0 to 60; 0.5 is 500 ms', 0, 60),
-                        help='s between reads, up to 60 (default: %(default)s)')
+                        help='s between reads of addresses and of rows without Period, up to 60 '
+                             '(default: %(default)s)')
     parser.add_argument('--csv', action='store_true',
                         help='print each value as time,station,address,value')
     parser.add_argument('--count', type=COUNT, metavar='N', help='end after N reads')
