@@ -35,11 +35,7 @@ def bad_check_ignored(end: AskingEnd) -> None:
 @case('A message with a wrong check is not executed.', f'{_SOURCE}, M 4-7 to 4-9',
       Target.PEER, *_SILENT, permission=Permission.WRITE)
 def bad_check_not_executed(end: AskingEnd) -> None:
-    def send(command: bytes) -> None:
-        end.wire.send(codec.damaged(end.frame(command)))
-        end.settle()
-
-    changes_nothing(end, send)
+    changes_nothing(end, lambda command: end.wire.send(codec.damaged(end.frame(command))))
 
 
 @case('A message of fewer than six bytes is ignored.', 'M 3-4, 4-4', *_SILENT)

@@ -21,12 +21,13 @@ MicroLogix), 7-20 and 7-28 to 7-30 (PLC-5) have them.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 
 from abdf1_ros.conform.case import case, Permission, Target
 from abdf1_ros.conform.codec import has_10_in_check, HEADER_SIZE, message, REPLY_BIT
-from abdf1_ros.conform.ends import AskingEnd, Words
+from abdf1_ros.conform.ends import AskingEnd, MOST_TRIES, Words
 from abdf1_ros.conform.wire import Failed, Skipped
 
 _ANSWERING = (Target.SLAVE, Target.PEER, Target.RADIO)
@@ -179,15 +180,48 @@ def _read(end: AskingEnd, count: int, words: Words | None = None) -> bytes:
     return data[len(data) - 2 * count:]
 
 
+@contextmanager
+def _kept(end: AskingEnd, count: int, *, is_written: bool = True) -> Iterator[bytes]:
+    """
+    Read ``count`` words, and restore them after the block, however it ends.
+
+    With ``is_written`` False they are restored only if they have changed. Raises Failed if the
+    words cannot be restored.
+    """
+    before = _read(end, count)
+    try:
+        yield before
+    finally:
+        _restore(end, before, is_due=is_written)
+
+
+def _restore(end: AskingEnd, before: bytes, *, is_due: bool) -> None:
+    """Write words if that ``is_due``, or if the target does not have them; read them back."""
+    got = ''
+    for _ in range(MOST_TRIES):
+        try:
+            end.settle()
+            if is_due:
+                end.ask(_TYPED, _write_body(end.words, before))
+            now = _read(end, len(before) // 2)
+        except (Failed, Skipped) as reason:
+            got = str(reason)
+            continue
+        if now == before:
+            return
+        is_due, got = True, now.hex(' ')
+    raise Failed(f'{before.hex(" ")} in {end.words.address} again, as before the case', got)
+
+
 def changes_nothing(end: AskingEnd, send: Callable[[bytes], object]) -> None:
     """Call ``send`` with a write command; raise Failed if the words then have its values."""
     words = _words_of(end)
-    before = _read(end, words.count)
-    written = bytes(byte ^ 0xFF for byte in before)
-    send(end.command(_TYPED, _write_body(words, written)))
-    if _read(end, words.count) == written:
-        _data(end.ask(_TYPED, _write_body(words, before)))
-        raise Failed(before.hex(' '), written.hex(' '))
+    with _kept(end, words.count, is_written=False) as before:
+        written = bytes(byte ^ 0xFF for byte in before)
+        send(end.command(_TYPED, _write_body(words, written)))
+        end.settle()
+        if _read(end, words.count) == written:
+            raise Failed(before.hex(' '), written.hex(' '))
 
 
 @case('A typed read returns the words that were asked for.', 'M 7-17, 7-28', *_ANSWERING)
@@ -227,16 +261,13 @@ def element_too_high(end: AskingEnd) -> None:
       'M 7-18, 7-30', *_ANSWERING, permission=Permission.WRITE)
 def write_and_read(end: AskingEnd) -> None:
     words = _words_of(end)
-    before = _read(end, words.count)
-    try:
+    with _kept(end, words.count):
         for pattern in (0x1010, 0x1234, 0x7FFF, 0x8000, 0x0000):
             wanted = b''.join((pattern ^ 0x0101 * number & 0xFFFF).to_bytes(2, 'little')
                               for number in range(words.count))
             _data(end.ask(_TYPED, _write_body(words, wanted)))
             if (got := _read(end, words.count)) != wanted:
                 raise Failed(wanted.hex(' '), got.hex(' '))
-    finally:
-        _data(end.ask(_TYPED, _write_body(words, before)))
 
 
 @case('Words are written and read in the order of their elements.', 'M 7-18, 7-30', *_ANSWERING,
@@ -245,16 +276,13 @@ def word_order(end: AskingEnd) -> None:
     words = _words_of(end)
     if words.count < 2:
         raise Skipped('needs --count 2 or more')
-    before = _read(end, words.count)
     wanted = [(0x8001 + 0x0102 * number).to_bytes(2, 'little') for number in range(words.count)]
-    try:
+    with _kept(end, words.count):
         _data(end.ask(_TYPED, _write_body(words, b''.join(wanted))))
         for number, word in enumerate(wanted):
             one = replace(words, element=words.element + number)
             if (got := _read(end, 1, one)) != word:
                 raise Failed(f'{word.hex(" ")} in {one.address}', got.hex(' '))
-    finally:
-        _data(end.ask(_TYPED, _write_body(words, before)))
 
 
 @case('A masked write changes the bits of its mask and no others.',
@@ -262,10 +290,9 @@ def word_order(end: AskingEnd) -> None:
 def masked_write(end: AskingEnd) -> None:
     words = _words_of(end)
     following = replace(words, element=words.element + 1)
-    before = _read(end, 1)
     reply = end.ask(_TYPED, _read_body(following, 1))
     beyond = b'' if reply[3] else reply[-2:]  # there may be no further word
-    try:
+    with _kept(end, 1):
         _data(end.ask(_TYPED, _write_body(words, b'\x55\xAA')))
         reply = end.ask(_TYPED, _masked_body(words, 0x8108, 0x0108))
         if reply[3] == _ILLEGAL:
@@ -275,5 +302,3 @@ def masked_write(end: AskingEnd) -> None:
             raise Failed('5d 2b', got.hex(' '))
         if beyond and (got := _read(end, 1, following)) != beyond:
             raise Failed(f'{beyond.hex(" ")} in {following.address}, as before', got.hex(' '))
-    finally:
-        _data(end.ask(_TYPED, _write_body(words, before)))

@@ -172,6 +172,7 @@ FAULTS = [(target, habit, name) for targets, habit, name in [
     (RADIO, Habit.LOST_AFTER_BROKEN_MESSAGE, 'broken-message'),
     (RADIO, Habit.REPLIES_FOR_OTHERS, 'other-destination-ignored'),
     (RADIO, Habit.EXECUTES_FOR_OTHERS, 'other-destination-not-executed'),
+    (RADIO, Habit.REPLIES_FOR_OTHERS, 'other-destination-not-executed'),
     (RADIO, Habit.REPLIES_TO_BROADCAST, 'broadcast-unanswered'),
     (RADIO, Habit.EXECUTES_DUPLICATES, 'duplicate-executed-once'),
     (RADIO, Habit.SENDS_ON_AGAIN, 'sent-on-once'),
