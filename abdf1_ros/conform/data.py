@@ -185,18 +185,23 @@ def _kept(end: AskingEnd, count: int, *, is_written: bool = True) -> Iterator[by
     """
     Read ``count`` words, and restore them after the block, however it ends.
 
-    With ``is_written`` False they are restored only if they have changed. Raises Failed if the
-    words cannot be restored.
+    With ``is_written`` False they are restored only if they have changed. Raises Failed, and
+    OSError with the values, if the words cannot be restored.
     """
     before = _read(end, count)
     try:
         yield before
     finally:
-        _restore(end, before, is_due=is_written)
+        try:
+            _restore(end, before, is_due=is_written)
+        except OSError as error:
+            raise OSError(f'{error.strerror or error}; {end.words.address} may not hold '
+                          f'{before.hex(" ")} any more') from error
 
 
 def _restore(end: AskingEnd, before: bytes, *, is_due: bool) -> None:
     """Write words if that ``is_due``, or if the target does not have them; read them back."""
+    end.wire.allow(end.wire.restoring_time)
     got = ''
     for _ in range(MOST_TRIES):
         try:
@@ -204,9 +209,12 @@ def _restore(end: AskingEnd, before: bytes, *, is_due: bool) -> None:
             if is_due:
                 end.ask(_TYPED, _write_body(end.words, before))
             now = _read(end, len(before) // 2)
-        except (Failed, Skipped) as reason:
-            got = str(reason)
+        except Failed as failure:
+            got = failure.got
             continue
+        except Skipped as reason:
+            got = got or str(reason)
+            break
         if now == before:
             return
         is_due, got = True, now.hex(' ')
@@ -214,14 +222,15 @@ def _restore(end: AskingEnd, before: bytes, *, is_due: bool) -> None:
 
 
 def changes_nothing(end: AskingEnd, send: Callable[[bytes], object]) -> None:
-    """Call ``send`` with a write command; raise Failed if the words then have its values."""
+    """Call ``send`` with a write command; raise Failed if a word then has its value."""
     words = _words_of(end)
     with _kept(end, words.count, is_written=False) as before:
         written = bytes(byte ^ 0xFF for byte in before)
         send(end.command(_TYPED, _write_body(words, written)))
         end.settle()
-        if _read(end, words.count) == written:
-            raise Failed(before.hex(' '), written.hex(' '))
+        got = _read(end, words.count)
+        if any(got[at:at + 2] == written[at:at + 2] for at in range(0, len(got), 2)):
+            raise Failed(before.hex(' '), got.hex(' '))
 
 
 @case('A typed read returns the words that were asked for.', 'M 7-17, 7-28', *_ANSWERING)

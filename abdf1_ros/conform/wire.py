@@ -33,6 +33,10 @@ _MOST_UNREAD = 65536
 _QUIET = 0.2  # s without a byte
 _DLE = b'\x10'
 
+# Longest time of restoring the words of the target, in answer times: a late reply, and then a
+# command with its reply.
+_RESTORING_TIMES = 12
+
 
 class RawLine(Protocol):
     """The source and target of bytes."""
@@ -114,10 +118,19 @@ class Wire:
         """Return the time (s) on the clock of the transcript."""
         return self._clock()
 
+    @property
+    def restoring_time(self) -> float:
+        """Return the longest time (s) of restoring the words of the target after a case."""
+        return _RESTORING_TIMES * self.answer_time
+
     def begin(self, limit: float) -> None:
         """Begin a case of at most ``limit`` s; after that time it is Skipped."""
         self.transcript.clear()
-        self._limit = self._clock() + limit
+        self.allow(limit)
+
+    def allow(self, seconds: float) -> None:
+        """Give the case ``seconds`` from now, whatever it has taken."""
+        self._limit = self._clock() + seconds
 
     def _check_limit(self) -> None:
         if self._clock() > self._limit:

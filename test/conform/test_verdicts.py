@@ -15,11 +15,13 @@
 """Each fault of an end is found by the case that names its rule; what is allowed passes."""
 
 from collections.abc import Callable
+import os
 
 from abdf1_ros.conform import codec
 from abdf1_ros.conform.case import CaseResult, Target, Verdict
 from abdf1_ros.conform.cases import CASES
 from abdf1_ros.conform.codec import BlockCheck, Symbol, SymbolKind
+from abdf1_ros.conform.data import changes_nothing
 from abdf1_ros.conform.ends import AskingEnd, MasterEnd, PeerEnd, SlaveEnd, Words
 from abdf1_ros.conform.wire import Failed, Wire
 import pytest
@@ -258,6 +260,30 @@ def test_fault_is_found_by_the_case_that_names_it(fault: tuple[Target, Habit, st
     assert told == TOLD.get((target, habit), told)
     # the case has restored the words of the PLC
     assert habit is Habit.MASK_CHANGES_NEXT_WORD or set().union(*end.files) <= {7}
+
+
+@pytest.mark.parametrize('name, got, habits', [
+    ('write-and-read', 'not judged: it takes too long', [Habit.VERY_LATE_REPLY]),
+    ('bad-check-not-executed', '05 01 4f 00 01 20', [
+        Habit.EXECUTES_BAD_CHECK_LATER, Habit.VERY_LATE_REPLY]),
+    ('bad-check-not-executed', 'f8 f8 07 07 07 07', [
+        Habit.EXECUTES_BAD_CHECK, Habit.WRITES_FIRST_WORD_ONLY])])
+def test_words_are_restored_after_a_lack_of_time_and_a_late_or_partial_write(
+        name: str, got: str, habits: list[Habit], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr('abdf1_ros.conform.case.LONGEST_CASE', 9.0)
+    line = MutatedSlave('CRC', *habits)
+    for words in line.files:
+        words[:] = b'\7' * len(words)
+    result, = results_of(line, Target.SLAVE, 'CRC', only=name)
+    assert (result.got, set().union(*line.files)) == (got, {7})
+
+
+def test_line_that_is_lost_before_words_are_restored_has_their_values_told() -> None:
+    line = MutatedPeer('CRC')
+    end = PeerEnd(Wire(line, BlockCheck.CRC, line.clock, is_half_duplex=False), 1, 5, 0,
+                  Words(7, 2, 1, 'SLC'))
+    with pytest.raises(OSError, match='Bad file descriptor; N7:2 may not hold 00 00 any more'):
+        changes_nothing(end, lambda _: setattr(line, 'read', lambda _: os.read(-1, 1)))
 
 
 @pytest.mark.parametrize('first', [0, pytest.param(1, marks=pytest.mark.long)])
