@@ -68,7 +68,7 @@ def other_command_executed(end: AskingEnd) -> None:
 def other_source_executed(end: AskingEnd) -> None:
     first = end.command(body=_ECHO)
     end.carry_out(first)
-    end.carry_out(first[:1] + bytes((end.own ^ 0x02,)) + first[2:])
+    end.carry_out(first[:1] + bytes((end.another,)) + first[2:])
 
 
 @case('A message with the header of the last but one is not a duplicate.', _SOURCE, *_ANSWERING)

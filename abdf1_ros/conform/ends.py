@@ -116,6 +116,12 @@ class AskingEnd(ABC):
         self.owed: set[bytes] = set()
         self._next_tns = first_tns
 
+    @property
+    def another(self) -> int:
+        """Return the number of a node that is neither the target nor we."""
+        return next(number for number in (254, 253, 252)
+                    if number not in (self.station, self.own))
+
     def command(self, cmd: int = 0x06, body: bytes = b'\x00', tns: int | None = None) -> bytes:
         """
         Return the link data of a command, by default of an echo without data.

@@ -53,10 +53,6 @@ def _sent_on(end: RadioEnd, command: bytes) -> int:
     return count
 
 
-def _for_another(end: RadioEnd) -> int:
-    return next(number for number in (254, 253, 252) if number not in (end.station, end.own))
-
-
 @case('A command is answered by its reply, and by nothing before or after it.', _RULES, _NODE)
 def reply_alone(end: RadioEnd) -> None:
     end.ask(0x06, b'\x00')
@@ -74,13 +70,13 @@ def symbols_ignored(end: RadioEnd) -> None:
 
 @case('A command for another DST gets no reply.', _RULES, _NODE)
 def other_destination_ignored(end: RadioEnd) -> None:
-    _sent_on(end, bytes((_for_another(end),)) + end.command()[1:])
+    _sent_on(end, bytes((end.another,)) + end.command()[1:])
 
 
 @case('A command for another DST is not executed.', _RULES, _NODE, permission=Permission.WRITE)
 def other_destination_not_executed(end: RadioEnd) -> None:
     changes_nothing(end, lambda command: _sent_on(
-        end, bytes((_for_another(end),)) + command[1:]))
+        end, bytes((end.another,)) + command[1:]))
 
 
 @case('A command for station 255 gets no reply.', _RULES, _NODE)
@@ -104,7 +100,7 @@ def duplicate_executed_once(end: RadioEnd) -> None:
 @case('A packet for another node is sent on once at most, though it is heard again.',
       _SENDING_ON, _NODE)
 def sent_on_once(end: RadioEnd) -> None:
-    command = bytes((_for_another(end),)) + end.command()[1:]
+    command = bytes((end.another,)) + end.command()[1:]
     count = sum(_sent_on(end, command) for _ in range(3))
     if count > 1:
         raise Failed('the packet once, or not at all', f'{count} times')
@@ -115,7 +111,7 @@ def sent_on_once(end: RadioEnd) -> None:
 @case('A packet whose SRC is the number of the node comes back to it: it is dropped.',
       _SENDING_ON, _NODE)
 def own_packet_dropped(end: RadioEnd) -> None:
-    for packet in (end.ask(0x06, b'\x00'), header(_for_another(end), end.station, 0x06, 1)):
+    for packet in (end.ask(0x06, b'\x00'), header(end.another, end.station, 0x06, 1)):
         end.send(packet)
         end.wire.expect_silence('it is a packet of its own', 2 * end.wire.answer_time)
 
