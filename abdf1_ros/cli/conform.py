@@ -31,7 +31,7 @@ import random
 import re
 import time
 
-from abdf1_ros.cli.plc.line import network_of
+from abdf1_ros.cli.plc.line import apart_from_target, network_of
 from abdf1_ros.cli.plc.options import add_line_options, LineDefaults
 from abdf1_ros.cli.terminal import (
     command_parser,
@@ -150,6 +150,8 @@ def _run(options: argparse.Namespace, target: Target, cases: Sequence[Case],
     made = options.pty is not None or options.tcp is not None
     network = network_of(options, 'half' if target.is_half_duplex else 'full', not made)
     asks = target in (Target.SLAVE, Target.PEER, Target.RADIO)
+    if target in (Target.SLAVE, Target.RADIO):  # in full duplex both may have one number
+        network = apart_from_target(network, options)
     serve = None if asks else _server(options, network)
     try:
         line = _open(options, network, stack)

@@ -60,7 +60,7 @@ def test_run_in_which_nothing_was_tried_has_not_passed(port: str, capsys: Output
 
 
 @pytest.mark.parametrize(('options', 'sent', 'got'), [
-    ('--station 2 --answer-time 0.05 --only message-acknowledged', '10 01 02 10 02 02 05 06 00',
+    ('--station 5 --answer-time 0.05 --only message-acknowledged', '10 01 05 10 02 05 0A 06 00',
      'silence'),  # below, the family that the user names goes before that of the target
     ('--family PLC5 --words N7:255 --only read-words',
      '10 01 01 10 02 01 05 0F 00 .. .. 68 00 00 01 00 06 07 FF FF 00 01 00', 'STS F0 07')])
@@ -185,6 +185,7 @@ def test_program_that_reads_is_answered_as_a_plc_answers(
     (['slave', '--port', '/nowhere/at/all'], 1, '/nowhere/at/all: No such file'),
     (['slave'], 2, '--port'), (['master', '--pty', '/proc/stat'], 1, '/proc/stat'),
     (['master', '--tcp', '127.0.0.1:0', '--data', '/none'], 2, '/none: cannot be read'),
+    (['radio', '--port', '/', '--own-station', '1'], 2, '1 is our own Station'),
     (['client', '--tcp', '[::1]:0', '--station', '9'], 2, 'the example data has stations')])
 def test_port_that_cannot_be_opened_is_one_and_what_is_wrong_in_options_two(
         args: list[str], status: int, text: str, capsys: Output) -> None:

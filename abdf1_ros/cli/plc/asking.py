@@ -18,10 +18,9 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-from dataclasses import replace
 
 from abdf1_ros.cli.plc import data, presence
-from abdf1_ros.cli.plc.line import free_station, MODES, network_of
+from abdf1_ros.cli.plc.line import apart_from_target, MODES, network_of
 from abdf1_ros.cli.plc.options import DEFAULT_STATION
 from abdf1_ros.cli.plc.session import complain, Session
 from abdf1_ros.cli.plc.targets import Targets
@@ -131,16 +130,10 @@ def _line(options: argparse.Namespace, targets: Targets | None, writes: bool) ->
             '--station', 'give the station to write to: this line may have several stations')])
     if options.station is None:
         options.station = DEFAULT_STATION
-    if not has_several or options.station != network.station:
-        return network
-    if options.is_assumed:
+    if options.is_assumed and options.station == network.station:
         raise ConfigurationError([Problem(
             '--station', f'give the station to ask; {options.station} is our own Station')])
-    if options.net or options.own_station is not None or network.line_mode.is_polled:
-        raise ConfigurationError([Problem('--own-station', (
-            f'{network.station} is our own Station, so no PLC can answer as {options.station}; '
-            'give us a station number that no PLC of the line has'))])
-    return replace(network, station=free_station(network.station, [options.station]))
+    return apart_from_target(network, options) if has_several else network
 
 
 def _advise(session: Session, text: str) -> None:

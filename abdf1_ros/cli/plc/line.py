@@ -46,6 +46,21 @@ def free_station(own: int, taken: Collection[int]) -> int:
     return next((number for number in candidates if number not in taken), own)
 
 
+def apart_from_target(network: Network, options: argparse.Namespace) -> Network:
+    """
+    Return a line on which we have another address than the station that the options name.
+
+    Raises ConfigurationError if a user gave us the address of that station.
+    """
+    if options.station != network.station:
+        return network
+    if options.net or options.own_station is not None or network.line_mode.is_polled:
+        raise ConfigurationError([Problem('--own-station', (
+            f'{network.station} is our own Station, so no PLC can answer as {options.station}; '
+            'give us a station number that no PLC of the line has'))])
+    return replace(network, station=free_station(network.station, [options.station]))
+
+
 def network_of(options: argparse.Namespace, duplex: str | None = None,
                needs_port: bool = True) -> Network:
     """
