@@ -117,6 +117,11 @@ class AskingEnd(ABC):
         self._next_tns = first_tns
 
     @property
+    def reply_time(self) -> float:
+        """Return the longest time (s) of a reply."""
+        return _REPLY_TIMES * self.wire.answer_time
+
+    @property
     def another(self) -> int:
         """Return the number of a node that is neither the target nor we."""
         return next(number for number in (254, 253, 252)

@@ -52,7 +52,7 @@ Habit = Enum('Habit', [
     'WRITES_NOTHING', 'MASKS_NOTHING', 'REFUSES_AREA',
     'SLOW',  # each response and reply 300 ms late
     'LATE_REPLY',  # 300 ms after the command
-    'VERY_LATE_REPLY',  # 1.5 s
+    'VERY_LATE_REPLY',  # 3 s
     'EXECUTES_BAD_CHECK',  # without a reply, whatever the response is
     'CHECKS_FIRST_BYTE_ONLY',  # of the two of a CRC
     'CHECKS_LAST_BYTE_ONLY', 'DOUBLES_CHECK',
@@ -171,7 +171,7 @@ class Wire:
     @property
     def reply_time(self) -> float:
         """Return the seconds from a command to its reply."""
-        return 1.5 if self.has(Habit.VERY_LATE_REPLY) else self.has(Habit.LATE_REPLY) * 0.3
+        return 3.0 if self.has(Habit.VERY_LATE_REPLY) else self.has(Habit.LATE_REPLY) * 0.3
 
     def say(self, data: bytes, delay: float = 0.0) -> None:
         """Send bytes; those of a slow end are late."""
