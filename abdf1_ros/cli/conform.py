@@ -27,6 +27,7 @@ import argparse
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import replace
+import math
 import random
 import re
 import time
@@ -38,14 +39,23 @@ from abdf1_ros.cli.terminal import (
     EXIT_FAILED,
     EXIT_INTERRUPTED,
     NoPort,
+    number_option,
     prepare_output,
     reason_of,
     run_command,
-    seconds_option,
     tell,
     whole_option,
 )
-from abdf1_ros.conform.case import Case, CaseResult, End, Permission, run_cases, Target, Verdict
+from abdf1_ros.conform.case import (
+    Case,
+    CaseResult,
+    End,
+    LONGEST_CASE,
+    Permission,
+    run_cases,
+    Target,
+    Verdict,
+)
 from abdf1_ros.conform.cases import CASES
 from abdf1_ros.conform.codec import BlockCheck, HEADER_SIZE
 from abdf1_ros.conform.ends import (
@@ -60,7 +70,7 @@ from abdf1_ros.conform.ends import (
     Words,
 )
 from abdf1_ros.conform.report import as_issue, as_json, line_of, summary_of
-from abdf1_ros.conform.wire import Failed, Wire
+from abdf1_ros.conform.wire import Failed, Skipped, Wire
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.stations import MAX_STATION
@@ -83,6 +93,9 @@ _NEAR = 2.0  # in units of --answer-time: an earlier DLE ENQ may look like an an
 
 _NOTHING_TRIED = 'no rule was tried: each case has its reason'
 _NOBODY = 'no byte was received: check cable, port, speed and power'
+
+# With more, a run could not try the cases in the time that it has.
+_ANSWER_TIME = number_option('a number of seconds above 0, up to 30', math.ulp(0.0), 30.0)
 
 _EPILOG = """\
 exit status: 0 if no case failed, 1 if a case failed, no case was tried, no byte was heard or the
@@ -212,10 +225,11 @@ def _judge(options: argparse.Namespace, target: Target, cases: Sequence[Case], w
 
 def _identity(end: AskingEnd) -> Identity | None:
     """Ask the target for its identity; without --family the cases that read use its family."""
-    end.settle()
+    end.wire.begin(LONGEST_CASE)
     try:
+        end.settle()
         identity = decode_identity(end.ask(0x06, b'\x03')[HEADER_SIZE:])
-    except (Failed, FormatError):  # the cases report the fault
+    except (Failed, Skipped, FormatError):  # the cases report the fault
         return None
     if identity.plc_type in (PlcType.PLC5, PlcType.SLC) and not end.words.family:
         end.words = replace(end.words, family=identity.plc_type.value)
@@ -295,9 +309,9 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument('--station', type=whole_option, default=1, metavar='N',
                         help='station of the target; if the target is a master or client: the '
                              'station we simulate (default: %(default)s)')
-    parser.add_argument('--answer-time', type=seconds_option, default=1.0, metavar='S',
-                        help='longest time (s) for an answer; silence of this length counts as '
-                             'no answer (default: %(default)s)')
+    parser.add_argument('--answer-time', type=_ANSWER_TIME, default=1.0, metavar='S',
+                        help='longest time (s) for an answer, up to 30; silence of this length '
+                             'counts as no answer (default: %(default)s)')
     parser.add_argument('--family', type=str.upper, choices=('PLC5', 'SLC'),
                         help='family of the target, for cases that read and write (default: the '
                              'target is asked)')

@@ -84,10 +84,11 @@ class Wire:
     no message has a response, so DLE ENQ gets none. ``transcript`` keeps all bytes in order;
     ``has_heard`` tells whether any byte came. ``hear`` returns a response inside a message before
     that message. ``enquired_after`` is the shortest time (s) from a message of the target to its
-    DLE ENQ. With ``passes_commands`` a command of the target itself, such as a MSG of its program,
-    is acknowledged and ignored. Bytes outside of any symbol are ignored, as M 4-7 to 4-9 requires,
-    and counted in ``noise``; DLE with a code that no symbol has is an answer. By radio a forwarded
-    reply that comes again is ignored, too (ML11 517 to 522).
+    DLE ENQ, ``begun`` the time when the line was there. With ``passes_commands`` a command of the
+    target itself, such as a MSG of its program, is acknowledged and ignored. Bytes outside of any
+    symbol are ignored, as M 4-7 to 4-9 requires, and counted in ``noise``; DLE with a code that no
+    symbol has is an answer. By radio a forwarded reply that comes again is ignored, too (ML11 517
+    to 522).
     """
 
     def __init__(self, line: RawLine, check: BlockCheck, clock: Callable[[], float], *,
@@ -104,6 +105,7 @@ class Wire:
         self.noise = 0
         self._line = line
         self._clock = clock
+        self.begun = clock()
         self._char_time = char_time
         self._buffer = b''
         self._embedded: deque[Symbol] = deque()
@@ -132,13 +134,15 @@ class Wire:
         """Give the case ``seconds`` from now, whatever it has taken."""
         self._limit = self._clock() + seconds
 
-    def _check_limit(self) -> None:
-        if self._clock() > self._limit:
+    def _time_left(self) -> float:
+        left = self._limit - self._clock()
+        if left <= 0:
             raise Skipped('not judged: it takes too long')
+        return left
 
     def send(self, raw: bytes) -> None:
         """Send bytes as they are."""
-        self._check_limit()
+        self._time_left()
         self.transcript.append(Sent(self._clock(), raw))
         self._sent_until = max(self._clock(), self._sent_until) + len(raw) * self._char_time
         if raw in (codec.ACK, codec.NAK):
@@ -199,8 +203,7 @@ class Wire:
             self._read(left)
 
     def _read(self, timeout: float) -> None:
-        self._check_limit()
-        data = self._line.read(timeout)
+        data = self._line.read(min(timeout, self._time_left()))
         self.has_heard = self.has_heard or bool(data)
         self._buffer = (self._buffer + data)[-_MOST_UNREAD:]
 

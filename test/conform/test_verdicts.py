@@ -23,7 +23,7 @@ from abdf1_ros.conform.cases import CASES
 from abdf1_ros.conform.codec import BlockCheck, Symbol, SymbolKind
 from abdf1_ros.conform.data import changes_nothing
 from abdf1_ros.conform.ends import AskingEnd, MasterEnd, PeerEnd, SlaveEnd, Words
-from abdf1_ros.conform.wire import Failed, Wire
+from abdf1_ros.conform.wire import Failed, Skipped, Wire
 import pytest
 from support.cases import for_all
 from support.conformance import failures, results_of
@@ -421,6 +421,15 @@ def test_wait_for_a_symbol_ends_though_others_come_for_ever() -> None:
     said = [codec.ACK, b'\x55']
     line.read = lambda timeout: said.pop()  # type: ignore[method-assign]
     assert wire.expect(SymbolKind.ACK).raw == codec.ACK
+
+
+def test_wait_ends_with_the_time_of_the_case() -> None:
+    line = MutatedSlave('CRC')
+    wire = Wire(line, BlockCheck.CRC, line.clock, is_half_duplex=True)
+    wire.begin(5.0)
+    with pytest.raises(Skipped, match='it takes too long'):
+        wire.hear(30.0)
+    assert line.now == 5.0
 
 
 def test_numbers_of_commands_begin_again_after_the_last() -> None:
