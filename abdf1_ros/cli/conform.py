@@ -97,6 +97,8 @@ _NOBODY = 'no byte was received: check cable, port, speed and power'
 # With more, a run could not try the cases in the time that it has.
 _ANSWER_TIME = number_option('a number of seconds above 0, up to 30', math.ulp(0.0), 30.0)
 
+_MOST_WORDS = 41  # of one command to the smallest processors (M 7-17)
+
 _EPILOG = """\
 exit status: 0 if no case failed, 1 if a case failed, no case was tried, no byte was heard or the
              port cannot be opened, 2 for bad options or files, 130 after Ctrl-C
@@ -319,7 +321,7 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
                         help='first integer word that cases may read, and overwrite with --yes '
                              '(default for reads: N7:0)')
     parser.add_argument('--count', type=whole_option, default=1, metavar='N',
-                        help='number of these words (default: %(default)s)')
+                        help=f'number of these words, up to {_MOST_WORDS} (default: %(default)s)')
     parser.add_argument('--yes', action='store_true',
                         help='also run cases that write, and cases that reset the line')
     parser.add_argument('--data', metavar='FILE',
@@ -347,8 +349,8 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
                      f'{target.value}; --list shows them')
     if not 0 <= options.station <= MAX_STATION:
         parser.error(f'--station {options.station} should be from 0 to {MAX_STATION}')
-    if not 1 <= options.count <= 100:
-        parser.error(f'--count {options.count} should be from 1 to 100')
+    if not 1 <= options.count <= _MOST_WORDS:
+        parser.error(f'--count {options.count} should be from 1 to {_MOST_WORDS}')
     if options.tcp is not None:
         try:
             options.tcp = host_and_port(options.tcp)
