@@ -338,7 +338,7 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument('--tcp', metavar='HOST:PORT', help='listen on a TCP port')
     parser.add_argument('--echo', action='store_true',
                         help='half duplex: the adapter echoes the bytes that we send')
-    add_line_options(parser, LineDefaults(), duplex=False)
+    add_line_options(parser, LineDefaults(), has_link=False)
     options = parser.parse_args(args)
     target = Target(options.target)
     if options.echo and not target.is_half_duplex:

@@ -71,7 +71,7 @@ def network_of(options: argparse.Namespace, duplex: str | None = None,
     base = load_network(options.net) if options.net else DEFAULTS
     given = {column: (str(value), f'--{option.replace("_", "-")}')
              for option, column in _COLUMNS.items()
-             if (value := getattr(options, option)) is not None}
+             if (value := getattr(options, option, None)) is not None}
     network = make_network(given, base)
     if network.timeout == 0:
         raise ConfigurationError([Problem('--timeout', '0 ms leaves no time for an answer')])

@@ -92,8 +92,8 @@ def add_line(parser: argparse.ArgumentParser) -> None:
 
 
 def add_line_options(parser: argparse.ArgumentParser, defaults: LineDefaults,
-                     duplex: bool = True) -> None:
-    """Add the options of the line; ``duplex`` False leaves the duplex options out."""
+                     has_link: bool = True) -> None:
+    """Add the options of the line; ``has_link`` False leaves out duplex and --timeout."""
     group = parser.add_argument_group('line')
     group.add_argument('--port', metavar='NAME',
                        help='serial port, or URL such as socket://192.168.0.9:4001')
@@ -104,13 +104,14 @@ def add_line_options(parser: argparse.ArgumentParser, defaults: LineDefaults,
     group.add_argument('--check', type=str.upper,
                        help=f'check of messages: CRC or BCC (default: {defaults.check})')
     group.add_argument('--parity', help='None, Even or Odd (default: None)')
-    if duplex:
+    if has_link:
         _add_duplex(group, defaults)
     group.add_argument('--own-station', metavar='N',
                        help=f'our own station, which no PLC may have (default: '
                             f'{DEFAULTS.station})')
-    group.add_argument('--timeout', metavar='MS',
-                       help=f'time to wait for each answer (default: {defaults.timeout})')
+    if has_link:
+        group.add_argument('--timeout', metavar='MS',
+                           help=f'time to wait for each answer (default: {defaults.timeout})')
 
 
 def _add_duplex(group: argparse._ArgumentGroup, defaults: LineDefaults) -> None:
