@@ -81,7 +81,7 @@ from abdf1_ros.pccc.families import decode_identity
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.ports.descriptor import Port
-from abdf1_ros.ports.endpoints import Endpoint, PtyEndpoint, TcpEndpoint
+from abdf1_ros.ports.endpoints import Endpoint, PtyWire, TcpEndpoint
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.wake import Wake
@@ -292,7 +292,7 @@ def _port(options: argparse.Namespace, network: Network, stack: ExitStack) -> Po
     if options.tcp is not None:
         end = TcpEndpoint(*options.tcp)
     elif options.pty is not None:
-        end = PtyEndpoint(options.pty)
+        end = PtyWire(options.pty, is_awaited=True)
     else:
         return open_port(PortSettings.of(network))
     stack.callback(end.close)

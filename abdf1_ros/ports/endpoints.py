@@ -149,16 +149,25 @@ class PtyPlace(PtyEndpoint):
 
 
 class PtyWire(PtyEndpoint):
-    """A pseudo-terminal as a wire: bytes that no program takes are lost."""
+    """
+    A pseudo-terminal as a wire: bytes that no program takes are lost.
 
-    def __init__(self, link: str | None) -> None:
+    A wire that ``is_awaited`` cannot be opened before a first program has opened the far end.
+    """
+
+    def __init__(self, link: str | None, *, is_awaited: bool = False) -> None:
         super().__init__(link)
+        self._is_awaited = is_awaited
         os.close(self._ends.pop())  # so that a read shows when no program has opened the far end
 
     def open(self) -> Port:  # noqa: A003
-        """Return our end, which stays open while programs come and go."""
+        """Return our end, which stays open while programs come and go; may raise NoClient."""
         descriptor = os.dup(self._ours)
-        return _WirePort(descriptor, lambda: os.close(descriptor), self.drop_unread)
+        port = _WirePort(descriptor, lambda: os.close(descriptor), self.drop_unread)
+        if self._is_awaited and port.is_idle:
+            port.close()
+            raise NoClient
+        return port
 
 
 class _WirePort(DescriptorPort):
@@ -170,6 +179,11 @@ class _WirePort(DescriptorPort):
         self._drop = drop
         self._hangs_up = select.poll()
         self._hangs_up.register(descriptor, 0)
+
+    @property
+    def is_idle(self) -> bool:
+        """Tell whether no program has opened the far end."""
+        return bool(self._hangs_up.poll(0))
 
     def read(self, timeout: float | None, wake: int) -> bytes:
         try:
@@ -183,7 +197,7 @@ class _WirePort(DescriptorPort):
 
     def write(self, data: bytes) -> None:
         with suppress(BlockingIOError):
-            if not self._hangs_up.poll(0):
+            if not self.is_idle:
                 os.write(self._descriptor, data)
 
 

@@ -127,6 +127,14 @@ def test_nobody_there_is_said(tmp_path: Path, capsys: Output) -> None:
     dead.close()
 
 
+def test_run_begins_when_a_program_has_opened_the_pseudo_terminal(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def wait(_: float) -> None:
+        raise KeyboardInterrupt
+    monkeypatch.setattr('abdf1_ros.cli.conform.time.sleep', wait)
+    assert main(['slave', '--pty', str(tmp_path / 'line'), '--only', 'poll-idle']) == 130
+
+
 def test_slave_behind_an_adapter_that_echoes(tmp_path: Path, capsys: Output) -> None:
     port = str(tmp_path / 'line')
     with running_simulator('--pty', port, '--echo'):

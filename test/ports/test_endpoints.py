@@ -98,6 +98,14 @@ def test_wire_loses_what_no_program_takes(tmp_path: Path, wake: int) -> None:
             assert port.read(PATIENCE, wake) == b'last'
 
 
+def test_wire_may_wait_for_its_first_program(tmp_path: Path) -> None:
+    with closing(PtyWire(str(tmp_path / 'plc'), is_awaited=True)) as line:
+        with pytest.raises(NoClient):
+            line.open()
+        with open(line.name, 'wb'):
+            line.open().close()
+
+
 def test_name_of_an_earlier_pty_is_taken_over(tmp_path: Path) -> None:
     name = tmp_path / 'plc'
     # One that is gone, and one whose number another program has by now.
