@@ -73,7 +73,7 @@ class CommandWriter(Node):
         super().__init__('command_writer')
         self._topic = f'{bridge}/write/{topic}'
         self._tags = tags
-        self._request = ''
+        self._request: str | None = None  # the label; '' for a text, None before we have written
         self._publisher: Any = None
         self.results: dict[str, DiagnosticStatus] = {}
         self._listener = self.create_subscription(
@@ -118,6 +118,7 @@ class CommandWriter(Node):
         else:
             message.data = [number(lambda text: int(text, 0), word, 'a whole number')
                             for word in words]
+        self._request = ''
         if not isinstance(message, std_msgs.msg.String):
             # The result repeats the label, so that we know our own result.
             self._request = f'{self.get_fully_qualified_name()} {uuid.uuid4()}'
@@ -132,7 +133,7 @@ class CommandWriter(Node):
 
     def _take(self, result: DiagnosticStatus) -> None:
         request = next((pair.value for pair in result.values if pair.key == 'request'), '')
-        if result.name in self._tags and (not self._request or request == self._request):
+        if result.name in self._tags and self._request in ('', request):
             self.results.setdefault(result.name, result)
 
     def _spin_until(self, condition: Callable[[], Any], timeout: float) -> bool:

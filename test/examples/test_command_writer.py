@@ -129,8 +129,11 @@ def answered(write: Write) -> Iterator[Answered]:
             KeyValue(key=key, value=value) for key, value in stations.items()])
         other = DiagnosticStatus(name='other/fake: interlocks', values=[
             KeyValue(key=key, value='in control for 9.0 s') for key in stations])
-        observer.node.create_timer(
-            0.1, lambda: diagnostics.publish(DiagnosticArray(status=[status, other])))
+        foreign = DiagnosticStatus(name='lamps', message='not written: refused', values=[
+            KeyValue(key='request', value='/command_writer 1')])
+        observer.node.create_timer(0.1, lambda: [
+            diagnostics.publish(DiagnosticArray(status=[status, other])),
+            results.publish(foreign)])
         answers: list[Answer] = []
 
         def take(message: Int16MultiArray) -> None:
@@ -156,9 +159,8 @@ def answered(write: Write) -> Iterator[Answered]:
 
 def test_results_of_other_mappings_and_other_writers_are_not_taken(answered: Answered) -> None:
     status, lines = answered(lambda data: [
-        ('recipe', 'not written: refused', OURS),
-        ('lamps', 'not written: refused', '/command_writer 1'),
-        ('lamps', 'written', OURS), ('lamps', 'unknown whether written', OURS)])
+        ('recipe', 'not written: refused', OURS), ('lamps', 'written', OURS),
+        ('lamps', 'unknown whether written', OURS)])
     assert (status, lines) == (0, ['lamps: written (1.0 ms)'])
 
 
