@@ -24,7 +24,7 @@ import time
 from abdf1_ros.cli.overhearing import Overhearing
 from abdf1_ros.cli.plc.session import opened
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import Poll
+from abdf1_ros.df1.frames import Frame, Poll
 from abdf1_ros.df1.listener import LineKind, ListeningDecoder
 from abdf1_ros.driver.overheard import Carried
 from abdf1_ros.errors import PortLost
@@ -36,11 +36,14 @@ LISTENED_FOR_READS = 10.0
 """Seconds to listen for the reads of another master, to make a map of these reads."""
 
 LISTENED = 1.0
-"""Seconds to listen at each speed; masters poll a few times a second."""
+"""Seconds to listen at each speed; most masters poll a few times a second."""
 
-# Number of polls that show a master. One poll is not enough: after DLE ENQ, one of 256 random byte
-# pairs has a right BCC.
-_SURE_POLLS = 2
+LISTENED_ON = 6.0
+"""Seconds to listen at a speed with one poll or message: more may come from a slow master."""
+
+# Number of polls and messages that show a master. One poll is not enough: after DLE ENQ, one of
+# 256 random byte pairs has a right BCC.
+_SURE = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,18 +65,20 @@ class ForeignMaster:
 def overhear(network: Network, bauds: Sequence[int],
              show: Callable[[str], None] = lambda text: None) -> ForeignMaster | None:
     """
-    Listen at each speed; stop at a speed without a character.
+    Listen at each speed; only at the first speed, if no character comes.
 
     Return the first master that is heard, None for none. Sends nothing.
 
     Raises NoPort and PortLost.
     """
+    has_traffic = False
     for baud in bauds:
         show(f'listening at {baud} baud')
-        characters, polls, check = _heard(replace(silent(network), baud=baud))
-        if polls.total() >= _SURE_POLLS:
-            return ForeignMaster(baud, sorted(polls), check)
-        if not characters:
+        characters, named, check = _heard(replace(silent(network), baud=baud))
+        if named.total() >= _SURE:
+            return ForeignMaster(baud, sorted(named), check)
+        has_traffic |= characters > 0
+        if not has_traffic:
             return None
     return None
 
@@ -90,19 +95,19 @@ def heard_reads(network: Network, seconds: float) -> list[Carried]:
     Raises NoPort and PortLost.
     """
     overhearing = Overhearing(network)
-    for at, data in _bytes_of(network, seconds):
+    for at, data in _bytes_of(network, lambda: seconds):
         # Bytes of a second port are marked by their class, SecondPort.
         overhearing.hear(Chunk(at, Direction.UNKNOWN, data))
     return overhearing.carried
 
 
-def _bytes_of(network: Network, seconds: float) -> Iterator[tuple[float, bytes]]:
+def _bytes_of(network: Network, seconds: Callable[[], float]) -> Iterator[tuple[float, bytes]]:
     """Open the port for ``seconds``; yield bytes as they come, with their time (s) since then."""
     port, wake = opened(network)(), Wake()
     try:
         begun = time.monotonic()
-        while (now := time.monotonic() - begun) < seconds:
-            data = port.read(seconds - now, wake.descriptor)
+        while (left := begun + seconds() - time.monotonic()) > 0:
+            data = port.read(left, wake.descriptor)
             yield time.monotonic() - begun, data
     except OSError as error:
         raise PortLost(error.strerror or str(error)) from None
@@ -112,14 +117,21 @@ def _bytes_of(network: Network, seconds: float) -> Iterator[tuple[float, bytes]]
 
 
 def _heard(network: Network) -> tuple[int, Counter[int], Checksum | None]:
-    """Return the number of characters, the polls with a good check, and the check of messages."""
+    """
+    Return what a master has sent, as far as its check is good.
+
+    The number of characters, how often a poll or message names each station, and the check.
+    """
     kind = LineKind()
     decoder = ListeningDecoder(kind)
-    characters, polls = 0, Counter[int]()
-    for _, data in _bytes_of(network, LISTENED):
+    characters, named = 0, Counter[int]()
+    for _, data in _bytes_of(
+            network, lambda: LISTENED_ON if 0 < named.total() < _SURE else LISTENED):
         characters += len(data)
         decoder.feed(data)
         while (symbol := decoder.next_symbol()) is not None:
-            if isinstance(symbol, Poll) and symbol.valid:
-                polls[symbol.station] += 1
-    return characters, polls, kind.checksum
+            if isinstance(symbol, Poll) and symbol.valid or (
+                    isinstance(symbol, Frame) and symbol.fault is None):
+                # Only a master names a station: slaves, and both ends of full duplex, do not.
+                named.update([] if symbol.station is None else [symbol.station])
+    return characters, named, kind.checksum

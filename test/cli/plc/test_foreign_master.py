@@ -40,9 +40,12 @@ from abdf1_ros.pccc.describe import describe
 from abdf1_ros.settings.network import Network
 import pytest
 from support.cases import for_all
+from support.clock import Clock
 from support.commands import Output
 from support.odd_device import frame
 from support.ptys import Pty
+
+POLL = b'\x10\x05\x01\xFF'
 
 
 class Master(threading.Thread):
@@ -129,18 +132,26 @@ def test_silent_line_is_listened_to_at_one_speed(
             for scheme in ('rfc2217', 'socket')] == ['Master', 'Listen']
 
 
-@pytest.mark.parametrize(('polls', 'told'), [
-    (b'\x10\x05\x01\xFF', 'None'),
-    (b'\x10\x05\x01\xFF\x10\x05\x03\xFD', 'polls stations 1, 3, 9600 baud, check unknown'),
-    (2 * b'\x10\x05\x01\xFF' + frame(bytes(6), 1), 'polls station 1, 9600 baud, CRC'),
-    (3 * b'\x10\x05\x01\xFE', 'None'), (b'\x10\x05\x01\xFF\x10\x05\x03\xFE', 'None')])
-def test_two_polls_with_a_good_check_show_a_master(
-        monkeypatch: pytest.MonkeyPatch, polls: bytes, told: str) -> None:
-    heard = {19200: b'\xF0', 9600: polls}
-    monkeypatch.setattr(overhear, 'LISTENED', 0.1)
+@pytest.mark.parametrize(('said', 'later', 'told'), [
+    (POLL, b'', 'None'), (POLL, POLL, 'polls station 1, 9600 baud, check unknown'),
+    (POLL + b'\x10\x05\x03\xFD', b'', 'polls stations 1, 3, 9600 baud, check unknown'),
+    (POLL + frame(bytes(6), 1), b'', 'polls station 1, 9600 baud, CRC'),
+    (2 * frame(bytes(6)), POLL, 'None'), (3 * b'\x10\x05\x01\xFE', POLL, 'None'),
+    (POLL + b'\x10\x05\x03\xFE', b'', 'None')])
+def test_two_polls_or_messages_with_a_good_check_show_a_master(
+        monkeypatch: pytest.MonkeyPatch, said: bytes, later: bytes, told: str) -> None:
+    heard = {(38400, False): b'\xF0', (9600, False): said, (9600, True): later}
+    clock = Clock()
+    monkeypatch.setattr(overhear, 'time', SimpleNamespace(monotonic=clock))
+
+    def read(baud: int, wait: float) -> bytes:
+        data = heard.pop((baud, wait > overhear.LISTENED), b'')
+        clock.now += 0.0 if data else wait
+        return data
+
     monkeypatch.setattr(overhear, 'opened', lambda network: lambda: SimpleNamespace(
-        read=lambda wait, wake: heard.pop(network.baud, b''), close=lambda: None))
-    found = str(overhear.overhear(Network(), [19200, 9600]))
+        read=lambda wait, wake: read(network.baud, wait), close=lambda: None))
+    found = str(overhear.overhear(Network(), [38400, 19200, 9600]))
     assert found.removeprefix('another master ') == told
 
 
