@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 import logging
 from typing import overload
 
@@ -33,7 +34,7 @@ from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.limits import raw_values
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Mapping
-from abdf1_ros.settings.network import load_network
+from abdf1_ros.settings.network import load_network, Network
 from abdf1_ros.text import first
 
 
@@ -49,7 +50,8 @@ class TaggedClient(OpenLine):
 
     def __init__(self, net_file: str, map_file: str, trace: str | None = None,
                  logger: logging.Logger = LOG) -> None:
-        network = load_network(net_file)
+        # With Standard only the stations of a driver are polled, all the time.
+        network = replace(load_network(net_file), polling=Network().polling)
         mappings, problems = load_mappings(map_file)
         problems += [problem for _, problem in line_problems(mappings, network)]
         if problems:

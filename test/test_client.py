@@ -358,7 +358,8 @@ alive,Heartbeat,N7:21,1,SLC,1,,,
 
 def files(folder: Path, port: str, rows: str = MAP, more: str = '') -> tuple[Path, Path]:
     net, rows_file = folder / 'net.csv', folder / 'map.csv'
-    net.write_text(f'Com_Port,Baud,Mode\n{port},115200,{more or "Master"}\n', encoding='utf-8')
+    net.write_text(f'Com_Port,Baud,Polling,Mode\n{port},115200,Standard,{more or "Master"}\n',
+                   encoding='utf-8')
     rows_file.write_text(rows, encoding='utf-8')
     return net, rows_file
 
