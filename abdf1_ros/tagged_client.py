@@ -25,6 +25,7 @@ from abdf1_ros.df1.stations import ActiveStationList, MAX_STATION
 from abdf1_ros.errors import FormatError
 from abdf1_ros.open_line import LOG, OpenLine, plain, PlcValue, single, text_of, values_of
 from abdf1_ros.pccc import steps
+from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.values import Values
 from abdf1_ros.plan.planner import Planner
 from abdf1_ros.plan.reading import read_planned
@@ -61,7 +62,7 @@ class TaggedClient(OpenLine):
         super().__init__(network.line_mode, network.line, PortSettings.of(network),
                          ActiveStationList(routes={row.station: row.via for row in mappings
                                                    if row.via is not None}),
-                         trace=trace, logger=logger)
+                         PlcType(network.plc_type), trace=trace, logger=logger)
 
     @overload
     def read(self, tag: str) -> PlcValue: ...

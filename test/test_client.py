@@ -307,8 +307,8 @@ def test_arguments_of_the_line_and_gateways_reach_it(
     assert given[0] == (MASTER, LinkSettings(
         station=254, checksum=Checksum.BCC, timing=LineTiming(port.char_time), nak_retries=10,
         enq_retries=10, timeout=0.25, cmd_timeout=0.75), port, more)
-    *_, stations, named = given[1]
-    assert (stations.via(9), stations.via(8), named) == (3, 8, more)
+    *_, stations, plc_type, named = given[1]
+    assert (stations.via(9), stations.via(8), str(plc_type), named) == (3, 8, 'SLC', more)
 
 
 def test_forgotten_close_is_told_and_closed_client_refuses(port: str) -> None:
@@ -358,8 +358,8 @@ alive,Heartbeat,N7:21,1,SLC,1,,,
 
 def files(folder: Path, port: str, rows: str = MAP, more: str = '') -> tuple[Path, Path]:
     net, rows_file = folder / 'net.csv', folder / 'map.csv'
-    net.write_text(f'Com_Port,Baud,Polling,Mode\n{port},115200,Standard,{more or "Master"}\n',
-                   encoding='utf-8')
+    net.write_text('PLC_Type,Com_Port,Baud,Polling,Mode\n'
+                   f'SLC,{port},115200,Standard,{more or "Master"}\n', encoding='utf-8')
     rows_file.write_text(rows, encoding='utf-8')
     return net, rows_file
 
