@@ -24,9 +24,11 @@ class Abdf1Error(Exception):
     Anything this package raises on purpose.
 
     ``about`` is the subject of the request, such as "N7:0 of station 1"; it is empty if unknown.
+    ``done`` tells the part of the request that was carried out before.
     """
 
     about: str = ''
+    done: str = ''
 
     def words(self) -> str:
         """Return what is wrong."""
@@ -34,7 +36,7 @@ class Abdf1Error(Exception):
 
     def __str__(self) -> str:
         """Return the subject and what is wrong with it."""
-        return f'{self.about}: {self.words()}' if self.about else self.words()
+        return f'{self.about and self.about + ": "}{self.words()}{self.done}'
 
 
 class FormatError(Abdf1Error, ValueError):

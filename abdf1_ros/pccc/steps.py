@@ -20,7 +20,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.errors import FormatError, RemoteError
+from abdf1_ros.errors import FormatError, LinkError, RemoteError
 from abdf1_ros.pccc import diagnostics
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
@@ -128,7 +128,7 @@ def write(target: AddressedValues, values: Sequence[float] | str) -> Steps[None]
 
     Raises FormatError at once if the values cannot or must not be written. The steps raise
     RemoteError if the PLC refuses a packet. If they raise LinkError, its ``sent`` tells whether
-    the PLC may have executed the packet all the same.
+    the PLC may have executed a packet all the same. The text of both tells the packets before.
     """
     address, codec = target.address, target.codec
     if fault := write_fault(address, codec.type, codec.length):
@@ -138,8 +138,20 @@ def write(target: AddressedValues, values: Sequence[float] | str) -> Steps[None]
 
 
 def _confirmed(requests: Sequence[Request], address: Address) -> Steps[None]:
-    for request in requests:
-        data_of((yield request), address)
+    for done, request in enumerate(requests):
+        try:
+            data_of((yield request), address)
+        except (RemoteError, LinkError) as error:
+            if done:
+                error.done = written_before(done, len(requests))
+                if isinstance(error, LinkError):
+                    error.sent = True
+            raise
+
+
+def written_before(done: int, packets: int) -> str:
+    """Return the end of the text about a write that ended after a part of its packets."""
+    return f' (after {done} of {packets} packets were written)'
 
 
 def write_requests(address: Address, codec: Codec, values: Sequence[float] | str,

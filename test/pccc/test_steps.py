@@ -14,8 +14,10 @@
 
 """Steps with a station, what becomes of the answers, and STS and EXT STS in words."""
 
+from itertools import product
+
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.errors import FormatError, RemoteError
+from abdf1_ros.errors import FormatError, PortLost, RemoteError
 from abdf1_ros.pccc import plc2, plc3, slc
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.dialect import Steps
@@ -88,12 +90,15 @@ def test_echo_is_what_was_sent() -> None:
             steps.send(reply(told))
 
 
-def test_write_stops_at_the_first_refusal() -> None:
-    steps = write(AddressedValues.of('N7:0', SLC, 250), [*range(250)])
-    assert next(steps)[1][:2] == bytes((0xAA, 234))
-    steps.send(reply())
-    with pytest.raises(RemoteError, match='STS 60'):
-        steps.send(reply(sts=0x60))
+def test_write_stops_at_the_first_failure_and_tells_what_was_written_before() -> None:
+    for done, error in product((0, 1), (None, PortLost('closed', sent=False))):
+        steps = write(AddressedValues.of('N7:0', SLC, 250), [*range(250)])
+        assert next(steps)[1][:2] == bytes((0xAA, 234))
+        assert not done or steps.send(reply())
+        with pytest.raises((RemoteError, PortLost)) as caught:
+            steps.throw(error) if error else steps.send(reply(sts=0x60))
+        assert str(caught.value).endswith(' (after 1 of 3 packets were written)') == done
+        assert getattr(caught.value, 'sent', done) == done
 
 
 def test_what_must_not_be_written_is_refused_before_the_first_step() -> None:

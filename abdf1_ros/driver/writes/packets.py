@@ -28,7 +28,7 @@ from abdf1_ros.errors import (
 from abdf1_ros.pccc.dialect import Steps
 from abdf1_ros.pccc.fields import word
 from abdf1_ros.pccc.status import check_status, STS_ILLEGAL_COMMAND
-from abdf1_ros.pccc.steps import data_of
+from abdf1_ros.pccc.steps import data_of, written_before
 
 # After these errors a station may execute the next packet.
 _TAKEN_OR_NOT = RemoteError, CommandTimeout, StationInactive
@@ -100,5 +100,5 @@ def _ended_early(write: Write, outcome: Outcome, done: int,
                  error: LinkError | RemoteError) -> WriteResult:
     if not done:
         return write.result(outcome, str(error), error)
-    detail = f'{error} (after {done} of {len(write.commands)} packets were written)'
+    detail = f'{error}{written_before(done, len(write.commands))}'
     return write.result(Outcome.PARTLY, detail, error)
