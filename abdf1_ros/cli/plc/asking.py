@@ -133,7 +133,10 @@ def _line(options: argparse.Namespace, targets: Targets | None, writes: bool) ->
     if options.is_assumed and options.station == network.station:
         raise ConfigurationError([Problem(
             '--station', f'give the station to ask; {options.station} is our own Station')])
-    return apart_from_target(network, options) if has_several else network
+    if not has_several:
+        return network
+    routes = targets.routes if targets else {}
+    return apart_from_target(network, options, {*routes, *routes.values()})
 
 
 def _advise(session: Session, text: str) -> None:

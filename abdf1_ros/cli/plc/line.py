@@ -40,16 +40,18 @@ _COLUMNS = {'port': 'com_port', 'baud': 'baud', 'check': 'error_code', 'parity':
             'timeout': 'timeout', 'own_station': 'station'}
 
 
-def free_station(own: int, taken: Collection[int]) -> int:
+def free_station(own: int, taken: Collection[int | None]) -> int:
     """Return a free address for us on a half-duplex line: ``own`` if possible."""
     candidates = (own, *range(_FIRST_SPARE, MAX_STATION))
     return next((number for number in candidates if number not in taken), own)
 
 
-def apart_from_target(network: Network, options: argparse.Namespace) -> Network:
+def apart_from_target(network: Network, options: argparse.Namespace,
+                      others: Collection[int] = ()) -> Network:
     """
     Return a line on which we have another address than the station that the options name.
 
+    If ours has to change, it becomes none of ``others`` either, and not that of the gateway.
     Raises ConfigurationError if a user gave us the address of that station.
     """
     if options.station != network.station:
@@ -58,7 +60,8 @@ def apart_from_target(network: Network, options: argparse.Namespace) -> Network:
         raise ConfigurationError([Problem('--own-station', (
             f'{network.station} is our own Station, so no PLC can answer as {options.station}; '
             'give us a station number that no PLC of the line has'))])
-    return replace(network, station=free_station(network.station, [options.station]))
+    taken = {options.station, getattr(options, 'via', None), *others}
+    return replace(network, station=free_station(network.station, taken))
 
 
 def network_of(options: argparse.Namespace, duplex: str | None = None,
@@ -80,9 +83,13 @@ def network_of(options: argparse.Namespace, duplex: str | None = None,
             '--port', 'name the port, such as --port /dev/ttyUSB0, or a net CSV with --net')])
     network = replace(network, mode=MODES.get(duplex or options.duplex, network.mode),
                       polling=DEFAULTS.polling)
-    if getattr(options, 'via', None) is not None and network.line_mode.has_one_plc:
+    via = getattr(options, 'via', None)
+    if via is not None and network.line_mode.has_one_plc:
         raise ConfigurationError([Problem(
             '--via', 'in full duplex a gateway has no address: --station is the node behind it')])
+    if via == network.station:
+        raise ConfigurationError([Problem(
+            '--via', f'{via} is our own Station, not a gateway; --own-station N changes ours')])
     # By radio there is no ACK, so --timeout limits the wait for the reply.
     is_told = network.duplex is Duplex.RADIO and options.timeout is not None
     return replace(network, cmd_timeout=network.timeout) if is_told else network

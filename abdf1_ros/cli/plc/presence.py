@@ -155,7 +155,7 @@ def scan(network: Network, stations: Sequence[int], via: int | None = None,
     that loses frames. On a line with station numbers we use a free number.
     """
     if not network.line_mode.has_one_plc and not network.line_mode.is_polled:
-        network = replace(network, station=free_station(network.station, stations))
+        network = replace(network, station=free_station(network.station, {*stations, via}))
     with Session(network, absent=stations, via=via) as session:
         left: Sequence[int] = stations
         counters, has_lost = session.counters, False

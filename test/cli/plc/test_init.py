@@ -120,13 +120,13 @@ def test_gateway_leads_to_the_nodes_behind_it() -> None:
 
 
 @pytest.mark.parametrize(('wiring', 'options', 'scan'), [
-    (Wiring.HALF, ('--duplex', 'half', '--stations', '8'), 'scan 0-63 --via 8'),
+    (Wiring.HALF, ('--duplex', 'half', '--stations', '64'), 'scan 0-63 --via 64'),
     (Wiring.FULL, ('--duplex', 'full'), 'scan 0-63')])
 def test_line_with_nothing_but_a_gateway_leads_to_the_nodes_behind_it(
         wiring: Wiring, options: tuple[str, ...], scan: str, tmp_path: Path,
         capsys: Output) -> None:
-    device = OddDevice(wiring, 8, (9,))
-    device.identities[8] = bytes.fromhex('00 FE 19 00 00 00 10 00 20 00')
+    device = OddDevice(wiring, 64, (9,))
+    device.identities[64] = bytes.fromhex('00 FE 19 00 00 00 10 00 20 00')
     with odd_line(tmp_path / 'plc', device) as name:
         assert main(['init', '--port', name, '--into', str(tmp_path), '--baud', '19200',
                      '--check', 'CRC', '--timeout', '2000', *options]) == 0
@@ -134,6 +134,7 @@ def test_line_with_nothing_but_a_gateway_leads_to_the_nodes_behind_it(
         assert f'plc {scan} --net' in said and 'watch' not in said
         assert main([*scan.split(), '--net', str(tmp_path / 'net.csv'), '--timeout', '2000']) == 0
     assert '\n      9 ' in capsys.readouterr().out
+    assert 64 not in {command[1] for command in device.executed}  # our number is not the gateway's
     rows = (tmp_path / 'map.csv').read_text(encoding='utf-8')
     assert f'#   plc {scan} --net net.csv' in rows and 'words_' not in rows
 
@@ -271,24 +272,24 @@ def test_directory_takes_few_reads(port: str, capsys: Output) -> None:
 
 
 def test_plc_behind_a_gateway(tmp_path: Path, capsys: Output) -> None:
-    plc = simulated_plc(2, 'SLC', time.monotonic, *SLC)
+    plc = simulated_plc(5, 'SLC', time.monotonic, *SLC)
     plc.via = 10
     store(plc, 'N7:1', [42])
     with plc_line(tmp_path / 'plc', plc) as name:
         line = ('--port', name, '--via', '10')
-        assert main(['read', 'N7:1', '--station', '2', *line]) == 0
+        assert main(['read', 'N7:1', '--station', '5', *line]) == 0
         said = capsys.readouterr()
         assert '42' in said.out and said.err == ''
-        assert main(['write', 'N7:1', '43', '--station', '2', '--yes', *line]) == 0
+        assert main(['write', 'N7:1', '43', '--station', '5', '--yes', *line]) == 0
         assert stored(plc, 'N7:1') == b'\x2B\0'
         capsys.readouterr()
-        assert main(['files', '2', '--files', '2-10', '--map', *line]) == 0
+        assert main(['files', '5', '--files', '2-10', '--map', *line]) == 0
         path = tmp_path / 'map.csv'
         path.write_text(capsys.readouterr().out, encoding='utf-8')
-        assert main(['files', '2', '--map', str(path), '--port', name]) == 0
+        assert main(['files', '5', '--map', str(path), '--port', name]) == 0
     mappings, problems = load_mappings(str(path))
     assert problems == []
-    assert {(mapping.station, mapping.via) for mapping in mappings} == {(2, 10)}
+    assert {(mapping.station, mapping.via) for mapping in mappings} == {(5, 10)}
 
 
 def test_plc_that_answers_for_a_gateway_it_is_not(port: str, capsys: Output) -> None:
