@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Addressing
@@ -33,6 +34,16 @@ from abdf1_ros.pccc.notation import CommandCode, KnownCommand
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.serving import ServedFamily
 from abdf1_ros.pccc.status import Meanings, USUAL_MEANINGS
+
+
+class Examples(NamedTuple):
+    """Addresses to begin with; only the words of ``status`` are in every processor."""
+
+    status: str = 'S:0'
+    words: str = 'N7:0'
+    bits: str = 'B3:0/0'
+    setpoint: str = 'N7:100'
+    heartbeat: str = 'N7:101'
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +62,7 @@ class Family:
     - ``is_spoken_by_all``: PLCs of other families know its commands, too.
     - ``file_search``: finds the files of a PLC, None if there is no way.
     - ``clock``: address of the first of six words: year, month, day, hour, minute, second.
+    - ``examples``: addresses of the first rows and commands that we propose.
     """
 
     addressing: Addressing
@@ -67,6 +79,7 @@ class Family:
     is_spoken_by_all: bool = False
     file_search: FileSearch | None = None
     clock: str = ''
+    examples: Examples = Examples()
 
     @property
     def plc_type(self) -> PlcType:

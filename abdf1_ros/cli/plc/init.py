@@ -26,6 +26,7 @@ from abdf1_ros.cli.plc.data import processor_cell
 from abdf1_ros.cli.plc.detect import Found
 from abdf1_ros.cli.plc.line import free_station, MODES
 from abdf1_ros.cli.plc.presence import Presence
+from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.file_search import DataFile
 from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings.network import Network
@@ -123,12 +124,12 @@ def map_rows(stations: Iterable[Presence], listed: Mapping[int, Sequence[DataFil
             continue
         tail = f'{number},{family.value},{processor_cell(identity.processor)}'
         guard = 'RUN' if identity.mode is not None else ''  # docs/heartbeats.md, rule 13
-        # Every processor of these families has the status file; N7 may be missing.
-        yield f'status_{number},Read,S:0,{tail},4,1000,,,\n'
-        yield f'# words_{number},Read,N7:0,{tail},10,1000,,,\n'
-        yield f'# interlocks_{number},Read,B3:0/0,{tail},8,250,{guard},,\n'
-        yield f'# setpoint_{number},Write,N7:100,{tail},1,,,0,2000\n'
-        yield f'# ros_alive_{number},Heartbeat,N7:101,{tail},,1000,,,\n'
+        there = FAMILIES[family].examples
+        yield f'status_{number},Read,{there.status},{tail},4,1000,,,\n'
+        yield f'# words_{number},Read,{there.words},{tail},10,1000,,,\n'
+        yield f'# interlocks_{number},Read,{there.bits},{tail},8,250,{guard},,\n'
+        yield f'# setpoint_{number},Write,{there.setpoint},{tail},1,,,0,2000\n'
+        yield f'# ros_alive_{number},Heartbeat,{there.heartbeat},{tail},,1000,,,\n'
         for row in files.map_rows(listed.get(number, ()), number, family,
                                   processor_cell(identity.processor)):
             yield f'{row}\n' if row.startswith('#') else \

@@ -40,6 +40,7 @@ from abdf1_ros.errors import (
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.dialect import Steps
 from abdf1_ros.pccc.families import dialect_of, FAMILIES, parse_address
+from abdf1_ros.pccc.family import Examples
 from abdf1_ros.pccc.file_search import is_there
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity
@@ -210,7 +211,7 @@ def io_access(session: Session, there: Presence) -> list[str]:
 
     Raises LinkError, and RemoteError of a node on the way.
     """
-    kind = there.identity.plc_type if there.identity else None
+    kind = _family(there)
     ways = () if kind is None else FAMILIES[kind].accesses
     if kind is None or Access.FLAT not in ways:
         return []
@@ -236,8 +237,16 @@ def common_identity(session: Session, *stations: int) -> Identity | None:
 
 def type_to_say(there: Presence) -> str:
     """Return the option that commands need for a PLC of an unknown family: SLC as a guess."""
-    is_known = there.identity is not None and there.identity.plc_type is not None
-    return '' if is_known else f' --plc-type {PlcType.SLC.value}'
+    return '' if _family(there) else f' --plc-type {PlcType.SLC.value}'
+
+
+def examples_of(there: Presence) -> Examples:
+    """Return addresses to begin with; a PLC of an unknown family counts as an SLC."""
+    return FAMILIES[_family(there) or PlcType.SLC].examples
+
+
+def _family(there: Presence) -> PlcType | None:
+    return there.identity.plc_type if there.identity else None
 
 
 def describe(presence: Presence) -> list[str]:

@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from abdf1_ros.pccc.access import Access
-from abdf1_ros.pccc.family import Family
+from abdf1_ros.pccc.family import Examples, Family
 from abdf1_ros.pccc.plc2 import identity
 from abdf1_ros.pccc.plc2.address import ADDRESSING
 from abdf1_ros.pccc.plc2.describe import DESCRIBED
@@ -38,4 +38,4 @@ FAMILY = Family(
     ADDRESSING,
     {way: Plc2Dialect(way) for way in (Access.UNPROTECTED, Access.PROTECTED, Access.CIF)},
     Plc2Commands, identity.decode, identity.encode, DESCRIBED, MEANINGS,
-    is_spoken_by_all=True)
+    is_spoken_by_all=True, examples=Examples('020', '020', '020/00', '030', '031'))

@@ -20,14 +20,16 @@ from pathlib import Path
 import time
 
 from abdf1_ros.cli.plc.command import main
+from abdf1_ros.cli.plc.detect import Found, LineSettings
 from abdf1_ros.cli.plc.files import find_files
 from abdf1_ros.cli.plc.files import map_rows as draft_rows
-from abdf1_ros.cli.plc.init import map_rows, NewFiles
+from abdf1_ros.cli.plc.init import files_of, map_rows, NewFiles
 from abdf1_ros.cli.plc.presence import Presence
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.cli.plc.verbs import init
 from abdf1_ros.cli.plc.verbs import ports as ports_verb
 from abdf1_ros.pccc import gateways
+from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.file_search import DataFile
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.identity import Identity, Mode
@@ -36,6 +38,7 @@ from abdf1_ros.ports.listing import SerialPortInfo
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.network import load_network, Network
+from abdf1_ros.settings.rows import Rows
 import pytest
 from support.commands import Output
 from support.driver_bench import simulated_plc, store, stored
@@ -74,18 +77,31 @@ def test_init_writes_files_that_the_node_takes(port: str, tmp_path: Path, capsys
     assert problems == []
     assert [(mapping.tag, mapping.plc_type.value, mapping.station) for mapping in mappings] == [
         ('status_1', 'PLC5', 1), ('status_2', 'SLC', 2)]
-    # The rows that are comments are good rows, too.
-    path = tmp_path / 'map.csv'
-    rows = [line.removeprefix('# ') if line.count(',') == 10 else line
-            for line in path.read_text(encoding='utf-8').splitlines()]
-    path.write_text('\n'.join(rows), encoding='utf-8')
-    mappings, problems = load_mappings(str(path))
-    assert (len(mappings), problems) == (15, [])
+    mappings = with_comments_used(tmp_path / 'map.csv')
+    assert len(mappings) == 15
     # What the SLC lists of its files; the PLC-5 has no such list.
     assert [cell_of(mapping, 'Address') for mapping in mappings if mapping.station == 2][5:] == [
         'S2:0', 'B3:0', 'N7:0', 'F10:0', 'L40:0']
     guarded = [mapping.tag for mapping in mappings if mapping.is_guarded]
     assert guarded == ['interlocks_1', 'interlocks_2']
+
+
+def with_comments_used(path: Path) -> Rows:
+    """Return the rows of a map, also those that are comments; all have to be good."""
+    rows = [line.removeprefix('# ') if line.count(',') == 10 else line
+            for line in path.read_text(encoding='utf-8').splitlines()]
+    path.write_text('\n'.join(rows), encoding='utf-8')
+    mappings, problems = load_mappings(str(path))
+    assert problems == []
+    return mappings
+
+
+def test_every_family_gets_rows_that_it_can_have(tmp_path: Path) -> None:
+    there = [Presence(number, 0.1, Identity(kind, '', mode=Mode.RUN), None, True, True)
+             for number, kind in enumerate(FAMILIES, 1)]
+    found = Found(LineSettings(9600, 'Master', 'CRC'), there[0])
+    (tmp_path / 'map.csv').write_text(files_of(Network(), found, there, {})[1], encoding='utf-8')
+    assert len(with_comments_used(tmp_path / 'map.csv')) == 5 * len(FAMILIES)
 
 
 def test_full_disk_leaves_no_file(tmp_path: Path) -> None:

@@ -78,5 +78,5 @@ def _first_task(found: Found) -> str:
     if there.is_of_gateway:
         return f'scan {init.nodes_of(there.station, mode)}{duplex}'
     is_default = mode == MODES['full'] and there.station == DEFAULT_STATION
-    return (f'read N7:0{duplex}{"" if is_default else f" --station {there.station}"}'
-            f'{presence.type_to_say(there)}')
+    return (f'read {presence.examples_of(there).words}{duplex}'
+            f'{"" if is_default else f" --station {there.station}"}{presence.type_to_say(there)}')

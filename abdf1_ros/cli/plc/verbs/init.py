@@ -89,7 +89,8 @@ def _first_look(found: detect.Found, there: Sequence[presence.Presence]) -> str:
     plc = next((seen for seen in there if not seen.is_of_gateway), None)
     if plc is None:
         return f'scan {init.nodes_of(there[0].station, found.settings.mode)}'
-    return f'watch S:0 --station {plc.station}{presence.type_to_say(plc)}'
+    return (f'watch {presence.examples_of(plc).status} --station {plc.station}'
+            f'{presence.type_to_say(plc)}')
 
 
 def _init_listening(network: Network, master: overhear.ForeignMaster | None,
