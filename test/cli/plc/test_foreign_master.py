@@ -229,6 +229,8 @@ def test_files_of_a_line_that_is_heard_have_its_speed_and_its_check_if_that_is_k
         'we send nothing', *texts_of([read]), f'written: {net}, {rows}',
         f'next: {called("check")} {net} {rows}']
     assert Path(net).read_text('utf-8').splitlines()[1] == f'Listen,{right},/dev/x,,1200,Even'
+    assert main(['init', '--port', 'rfc2217://x:1', '--into', str(tmp_path / 'far')]) == 1
+    assert 'Mode Listen works with socket:// or a device, not with' in capsys.readouterr().err
     assert [(line.mode, line.baud, line.error_code) for line in heard] == [('Listen', 1200, right)]
 
 

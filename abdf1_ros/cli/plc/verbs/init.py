@@ -97,9 +97,12 @@ def _init_listening(network: Network, master: overhear.ForeignMaster | None,
                     target: init.NewFiles) -> int:
     """Write net.csv and map.csv for Mode Listen, with the reads of another master."""
     if master is not None:
-        print(f'{master}: we send nothing')
         check = network.error_code if master.check is None else master.check.value
         network = replace(overhear.silent(network), baud=master.baud, error_code=check)
+        if not network.line_mode.only_listens:
+            return only_heard(
+                master, 'Mode Listen works with socket:// or a device, not with rfc2217://')
+        print(f'{master}: we send nothing')
     progress = Progress()
     progress.show(f'listening for {overhear.LISTENED_FOR_READS:.0f} s')
     reads = overhear.heard_reads(network, overhear.LISTENED_FOR_READS)
