@@ -17,14 +17,16 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+import sys
 
 from abdf1_ros.cli.plc import data, presence
 from abdf1_ros.cli.plc.line import apart_from_target, MODES, network_of
 from abdf1_ros.cli.plc.options import DEFAULT_STATION
 from abdf1_ros.cli.plc.session import complain, Session
 from abdf1_ros.cli.plc.targets import Targets
-from abdf1_ros.cli.terminal import EXIT_FAILED
+from abdf1_ros.cli.terminal import drop_output, EXIT_FAILED
 from abdf1_ros.errors import Abdf1Error, LinkError, PortLost, RemoteError
 from abdf1_ros.open_line import kind_of
 from abdf1_ros.pccc import steps
@@ -103,11 +105,27 @@ def failed(options: argparse.Namespace, session: Session, error: Abdf1Error, pla
     return EXIT_FAILED
 
 
+@contextmanager
+def after_write(text: str) -> Iterator[None]:
+    """Look at a complete write, whose result is ``text``; no failure there ends the command."""
+    try:
+        yield
+        sys.stdout.flush()
+    except KeyboardInterrupt:
+        pass
+    except Abdf1Error as error:
+        complain(f'cannot be read back: {error}')
+    except OSError as error:
+        drop_output()
+        complain(f'{text}, but that cannot be printed: {error.strerror}')
+
+
 def check_type(options: argparse.Namespace, session: Session, station: int) -> None:
     """Ask a PLC for its type once; warn if an option gives another type."""
     if '--plc-type' not in session.said:
         session.said.add('--plc-type')
-        _advise(session, presence.type_hint(session, station, options.plc_type))
+        with suppress(PortLost):  # this is advice only
+            _advise(session, presence.type_hint(session, station, options.plc_type))
 
 
 def _line(options: argparse.Namespace, targets: Targets | None, writes: bool) -> Network:

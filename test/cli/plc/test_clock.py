@@ -21,10 +21,12 @@ import re
 import time
 from types import SimpleNamespace
 from typing import cast
+from unittest.mock import Mock
 
 from abdf1_ros.cli.plc.command import main
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.cli.plc.verbs.clock import Clock, told
+from abdf1_ros.errors import FormatError, PortLost
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
@@ -83,6 +85,12 @@ def test_clock_is_set_when_that_is_wanted(
     set_clock(plcs[station - 1], before)
     said = call(main, capsys, *args, '--yes')
     assert (said.status, 'its clock has not changed' in said.err) == (1, True)
+    for error, status, err in (
+            (KeyboardInterrupt(), 0, ''), (FormatError('no date'), 1, ': no date\n'),
+            (PortLost('gone'), 0, 'plc: cannot be read back: port lost: gone\n')):
+        monkeypatch.setattr(Clock, 'read', Mock(side_effect=error))
+        said = call(main, capsys, *args, '--yes')
+        assert (said.status, said.err.endswith(err)) == (status, True)
 
 
 def test_drift_counts_from_the_middle_of_the_read(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -23,7 +23,7 @@ import sys
 from unittest.mock import Mock
 
 from abdf1_ros.cli.plc.command import main
-from abdf1_ros.errors import FormatError
+from abdf1_ros.errors import FormatError, PortLost
 import pytest
 from support.cases import for_all
 from support.commands import Output, PATIENT, Plc
@@ -113,13 +113,16 @@ def test_write_without_yes_writes_nothing(plc: Plc) -> None:
 def test_write_of_what_cannot_be_read(plc: Plc, monkeypatch: pytest.MonkeyPatch) -> None:
     fault = FormatError('too short')
     monkeypatch.setattr('abdf1_ros.cli.plc.data.read', Mock(side_effect=[
-        fault, fault, KeyboardInterrupt]))
+        fault, fault, KeyboardInterrupt, (5,), (5,)]))
+    monkeypatch.setattr('abdf1_ros.cli.plc.presence.type_hint', Mock(side_effect=[
+        KeyboardInterrupt, PortLost('gone')]))
     write, written = ('write', 'N7:22', '5', '--station', '2'), 'N7:22 of station 2: written; now:'
     for words, status, line, err in (
             ((), 2, 'would write [5] to N7:22 of station 2', 'plc: N7:22 of station 2: too short\n'
              'plc: nothing was written; --yes writes\n'),
             (('--yes',), 0, written, 'plc: cannot be read back: too short\n'),
-            (('--yes',), 0, written, '')):
+            (('--yes',), 0, written, ''),
+            *[(('--yes', '--plc-type', 'SLC'), 0, 'N7:22 5', '')] * 2):
         said = plc(*write, *words)
         assert (said.status, said.lines[-1], said.err) == (status, line, err)
 

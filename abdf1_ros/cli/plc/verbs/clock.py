@@ -25,7 +25,7 @@ import argparse
 from datetime import datetime, timedelta
 
 from abdf1_ros.cli.plc import data
-from abdf1_ros.cli.plc.asking import ask, check_type, failed, family_of
+from abdf1_ros.cli.plc.asking import after_write, ask, check_type, failed, family_of
 from abdf1_ros.cli.plc.options import add_plc_type, add_station
 from abdf1_ros.cli.plc.session import complain, Session
 from abdf1_ros.cli.terminal import EXIT_FAILED, EXIT_UNKNOWN, EXIT_USAGE, is_wanted
@@ -69,15 +69,19 @@ def _clock(options: argparse.Namespace, session: Session) -> int:
             if status != EXIT_UNKNOWN:
                 check_type(options, session, options.station)
             return status
-        time, ahead = clock.read()
+        with after_write('written'):
+            try:
+                time, ahead = clock.read()
+            except FormatError as error:  # the PLC has replaced what was written
+                return failed(options, session, error, clock.address)
+            print(f'station {options.station}: {told(time, ahead)}', flush=True)
+            if abs(ahead) > _TAKEN:
+                complain('the PLC confirmed the write, but its clock has not changed: these words '
+                         'may be a copy of the clock; set the clock with the software of the PLC')
+                return EXIT_FAILED
     except Abdf1Error as error:
         return failed(options, session, error, clock.address)
-    print(f'station {options.station}: {told(time, ahead)}')
-    if abs(ahead) <= _TAKEN:
-        return 0
-    complain('the PLC confirmed the write, but its clock has not changed: these words may be a '
-             'copy of the clock; set the clock with the software of the PLC')
-    return EXIT_FAILED
+    return 0
 
 
 class Clock:

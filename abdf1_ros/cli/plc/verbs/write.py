@@ -29,18 +29,11 @@ import sys
 from typing import Any
 
 from abdf1_ros.cli.plc import data
-from abdf1_ros.cli.plc.asking import ask, check_type, failed, mappings_of
+from abdf1_ros.cli.plc.asking import after_write, ask, check_type, failed, mappings_of
 from abdf1_ros.cli.plc.options import add_data_options, DEFAULT_STATION
 from abdf1_ros.cli.plc.session import complain, Session
 from abdf1_ros.cli.plc.targets import no_value, Targets, to_write
-from abdf1_ros.cli.terminal import (
-    colour,
-    drop_output,
-    EXIT_UNKNOWN,
-    EXIT_USAGE,
-    GREEN,
-    is_wanted,
-)
+from abdf1_ros.cli.terminal import colour, EXIT_UNKNOWN, EXIT_USAGE, GREEN, is_wanted
 from abdf1_ros.errors import Abdf1Error
 
 UNREAD_STATUS = EXIT_USAGE
@@ -97,10 +90,17 @@ def _write(options: argparse.Namespace, session: Session, targets: Targets) -> i
     if not options.yes and not _is_confirmed(options, session, writing):
         complain('nothing was written; --yes writes')
         return EXIT_USAGE
-    status = _carry_out(session, writing)
-    if status != EXIT_UNKNOWN:
+    result = writing.carry_out(session)
+    if status := data.status_of(result):
+        if status != EXIT_UNKNOWN:
+            check_type(options, session, mapping.station)
+        return status
+    with after_write(str(result)):
+        print(f'{data.named(mapping)} of station {mapping.station}: '
+              f'{colour(str(result), GREEN, sys.stdout)}; now:', flush=True)
+        data.print_values(mapping, data.read(session, mapping))
         check_type(options, session, mapping.station)
-    return status
+    return 0
 
 
 def _is_confirmed(options: argparse.Namespace, session: Session, writing: data.Writing) -> bool:
@@ -112,24 +112,3 @@ def _is_confirmed(options: argparse.Namespace, session: Session, writing: data.W
     except Abdf1Error as error:
         failed(options, session, error, data.named(mapping), mapping)
     return is_wanted(f'write {writing} to {data.named(mapping)} of station {mapping.station}')
-
-
-def _carry_out(session: Session, writing: data.Writing) -> int:
-    """Write, show the values in the PLC after it, and return the exit status."""
-    mapping = writing.mapping
-    result = writing.carry_out(session)
-    if status := data.status_of(result):
-        return status
-    place, text = f'{data.named(mapping)} of station {mapping.station}', str(result)
-    try:
-        print(f'{place}: {colour(text, GREEN, sys.stdout)}; now:', flush=True)
-        data.print_values(mapping, data.read(session, mapping))
-        sys.stdout.flush()
-    except KeyboardInterrupt:  # the write is complete
-        pass
-    except Abdf1Error as error:
-        complain(f'cannot be read back: {error}')
-    except OSError as error:
-        drop_output()
-        complain(f'{text}, but that cannot be printed: {error.strerror}')
-    return 0
