@@ -65,16 +65,18 @@ def apart_from_target(network: Network, options: argparse.Namespace,
 
 
 def network_of(options: argparse.Namespace, duplex: str | None = None,
-               needs_port: bool = True) -> Network:
+               needs_port: bool = True, timeout: str | None = None) -> Network:
     """
     Return the line of the options; raises ConfigurationError with every fault.
 
-    ``duplex``: used if the command has no duplex option.
+    ``duplex``: used if the command has no duplex option; ``timeout``: if the user gave none.
     """
     base = load_network(options.net) if options.net else DEFAULTS
     given = {column: (str(value), f'--{option.replace("_", "-")}')
              for option, column in _COLUMNS.items()
              if (value := getattr(options, option, None)) is not None}
+    if timeout is not None:
+        given.setdefault('timeout', (timeout, '--timeout'))
     network = make_network(given, base)
     if network.timeout == 0:
         raise ConfigurationError([Problem('--timeout', '0 ms leaves no time for an answer')])

@@ -77,11 +77,10 @@ def add_folder(parser: argparse.ArgumentParser, what: str) -> None:
 
 
 def add_stations_to_try(parser: argparse.ArgumentParser) -> None:
-    """Add the option for the stations to try settings with, and set a short Timeout."""
+    """Add the option for the stations to try settings with."""
     parser.add_argument('--stations', metavar='LIST', type=stations_option,
                         default=tuple(range(8)),
                         help='half duplex: stations to look for (default: 0-7)')
-    parser.set_defaults(timeout=DETECT_DEFAULTS.timeout)
 
 
 def add_line(parser: argparse.ArgumentParser) -> None:

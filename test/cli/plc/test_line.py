@@ -56,7 +56,9 @@ def test_every_option_sets_its_field_of_the_network() -> None:
 def test_peer_is_full_duplex_and_by_radio_a_timeout_is_for_the_reply() -> None:
     assert line_of('--port', '1', '--peer') == line_of('--port', '1', '--duplex', 'full')
     radio = [line_of('--port', '1', '--radio', *timeout) for timeout in ((), ('--timeout', '150'))]
-    assert [line.cmd_timeout for line in radio] == [Network().cmd_timeout, 150]
+    radio.append(network_of(parse('init', '--port', '1', '--radio'), timeout='200'))
+    assert [(line.timeout, line.cmd_timeout) for line in radio] == [
+        (300, Network().cmd_timeout), (150, 150), (200, Network().cmd_timeout)]
 
 
 def test_gateway_has_an_address_in_half_duplex_that_is_not_ours() -> None:
@@ -211,11 +213,8 @@ def test_help_tells_what_detect_does_by_default(capsys: pytest.CaptureFixture[st
     assert 'take the line from this net CSV' in text
 
 
-def test_detect_waits_for_a_short_time_only() -> None:
-    assert parse('detect').timeout == '200'
+def test_detect_looks_for_few_stations() -> None:
     assert parse('detect').stations == tuple(range(8))
-    assert parse('detect', '--timeout', '500').timeout == '500'
-    assert parse('scan', '1').timeout is None
 
 
 def test_list_of_stations_has_ranges_and_numbers() -> None:

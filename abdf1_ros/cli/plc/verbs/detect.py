@@ -50,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Try settings; print the settings that work, and the next command."""
-    network = network_of(options)
+    network = network_of(options, timeout=DETECT_DEFAULTS.timeout)
     found = found_settings(options, network)
     if isinstance(found, overhear.ForeignMaster):
         return only_heard(found, '"plc init" writes net.csv and map.csv for Mode Listen')

@@ -57,7 +57,7 @@ def run(options: argparse.Namespace) -> int:
     target = init.NewFiles(Path(options.into), 'net.csv', 'map.csv')
     if not options.port and not options.net:
         options.port = _only_port()
-    network = network_of(options)
+    network = network_of(options, timeout=DETECT_DEFAULTS.timeout)
     found = None if network.line_mode.only_listens else found_settings(options, network)
     master = found if isinstance(found, overhear.ForeignMaster) else None
     if master is not None or network.line_mode.only_listens:
