@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
+import errno
 import os
 from pathlib import Path
 
@@ -63,15 +64,20 @@ class NewFiles:
                     'exists already and is not changed; give another folder with --into'))])
 
     def write(self, *texts: str) -> None:
-        """Write all files, or leave none and raise ConfigurationError."""
+        """Write all files, or leave none of them and raise ConfigurationError."""
+        path, begun = self.paths[0], list[Path]()
         try:
-            self.paths[0].parent.mkdir(parents=True, exist_ok=True)
+            path.parent.mkdir(parents=True, exist_ok=True)
             for path, text in zip(self.paths, texts, strict=True):
-                path.write_text(text, encoding='utf-8')
+                with path.open('a', encoding='utf-8') as file:
+                    if file.tell():  # another program has written it meanwhile
+                        raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST))
+                    begun.append(path)
+                    file.write(text)
         except OSError as error:
-            for path in self.paths:
+            for written in begun:
                 with suppress(OSError):
-                    path.unlink()
+                    written.unlink()
             raise ConfigurationError([Problem(
                 str(path), f'cannot be written: {error.strerror}')]) from None
 

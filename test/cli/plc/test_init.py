@@ -104,12 +104,17 @@ def test_every_family_gets_rows_that_it_can_have(tmp_path: Path) -> None:
     assert len(with_comments_used(tmp_path / 'map.csv')) == 5 * len(FAMILIES)
 
 
-def test_full_disk_leaves_no_file(tmp_path: Path) -> None:
+def test_full_disk_leaves_no_file_but_those_of_others(tmp_path: Path) -> None:
     files = NewFiles(tmp_path / 'plant' / 'line_1', 'net.csv', 'map.csv')
     with no_file_longer_than(10), pytest.raises(ConfigurationError,
                                                 match='map.csv: cannot be written: File too'):
         files.write('short', 'too long for it')
     assert not any(path.exists() for path in files.paths)
+    files.paths[1].write_text('mine', encoding='utf-8')  # while we searched
+    with pytest.raises(ConfigurationError, match='map.csv: cannot be written: File exists'):
+        files.write('net', 'map')
+    assert [path.name for path in files.paths[0].parent.iterdir()] == ['map.csv']
+    assert files.paths[1].read_text(encoding='utf-8') == 'mine'
 
 
 def test_plc_of_an_unknown_family_leaves_no_later_one_out() -> None:
