@@ -81,7 +81,9 @@ class TaggedClient(OpenLine):
             row = self._row(tag, 'read', lambda row: row.polls)
             with self.naming(_named(row)):
                 return _shown(row, self.ask(row.station, steps.read(row.target)))
-        rows = [self._row(name, 'read', lambda row: row.polls) for name in dict.fromkeys(tag)]
+        # They are read once, so their Periods must not keep them apart.
+        rows = [replace(self._row(name, 'read', lambda row: row.polls), period=None)
+                for name in dict.fromkeys(tag)]
         values = dict(read_planned(Planner(self.line_model, 1.0), rows, self))
         return {row.tag: _shown(row, values[row]) for row in rows}
 

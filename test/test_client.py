@@ -346,13 +346,14 @@ def test_line_that_comes_back_is_used_again(tmp_path: Path, plcs: PlcPair) -> No
 
 
 MAP = """\
-Tag,Command,Address,Station,PLC_Type,Length,Scale,Min,Max
-speed,ReadWrite,N7:0,1,SLC,1,0.1,0,50
-doors,Read,B3:0/0,1,SLC,3,,,
-recipe,Write,N7:10,2,PLC5,2,,,
-name,ReadWrite,ST9:0,1,SLC,,,,
-all,Write,N7:20,255,PLC5,1,,,
-alive,Heartbeat,N7:21,1,SLC,1,,,
+Tag,Command,Address,Station,PLC_Type,Length,Scale,Min,Max,Period
+speed,ReadWrite,N7:0,1,SLC,1,0.1,0,50,10
+doors,Read,B3:0/0,1,SLC,3,,,,
+recipe,Write,N7:10,2,PLC5,2,,,,
+name,ReadWrite,ST9:0,1,SLC,,,,,
+far,Read,N7:9,1,SLC,1,,,,60000
+all,Write,N7:20,255,PLC5,1,,,,
+alive,Heartbeat,N7:21,1,SLC,1,,,,
 """
 
 
@@ -367,7 +368,7 @@ def files(folder: Path, port: str, rows: str = MAP, more: str = '') -> tuple[Pat
 def test_rows_of_a_map_are_read_and_written_by_their_tags(
         port: str, tmp_path: Path, plcs: PlcPair) -> None:
     with Client.from_files(*files(tmp_path, port)) as plant:
-        assert list(plant.rows) == ['speed', 'doors', 'recipe', 'name']
+        assert list(plant.rows) == ['speed', 'doors', 'recipe', 'name', 'far']
         plant.write('speed', 12.34)
         assert stored(plcs[0], 'N7:0') == (123).to_bytes(2, 'little')
         assert plant.read('speed') == pytest.approx(12.3)
@@ -376,8 +377,8 @@ def test_rows_of_a_map_are_read_and_written_by_their_tags(
         plant.write('name', 'left')
         assert (plant.read('name'), plant.read('doors')) == ('left', [False] * 3)
         before = plant.counters.commands_sent
-        assert plant.read(['name', 'speed', 'doors']) == {
-            'name': 'left', 'speed': pytest.approx(12.3), 'doors': [False] * 3}
+        assert plant.read(['name', 'speed', 'doors', 'far']) == {
+            'name': 'left', 'speed': pytest.approx(12.3), 'doors': [False] * 3, 'far': 0}
         assert plant.counters.commands_sent - before == 3
         for call, text in (
                 (lambda: plant.write('speed', 51), 'value 51 at index 0 is outside Min 0, Max 50'),
@@ -390,10 +391,10 @@ def test_rows_of_a_map_are_read_and_written_by_their_tags(
 
 
 def test_faults_of_the_files_are_told_before_the_port_is_opened(tmp_path: Path) -> None:
-    rows = MAP + 'bad,Read,N7:x,1,SLC,1,,,\nours,Read,N7:30,5,SLC,1,,,\n'
+    rows = MAP + 'bad,Read,N7:x,1,SLC,1,,,,\nours,Read,N7:30,5,SLC,1,,,,\n'
     with pytest.raises(ConfigurationError) as error:
         Client.from_files(*files(tmp_path, '/dev/none', rows))
-    assert [problem.place.line for problem in error.value.problems] == [8, 9]
+    assert [problem.place.line for problem in error.value.problems] == [9, 10]
     with pytest.raises(ConfigurationError, match='^Mode: in Mode Listen nothing may be sent on'):
         Client.from_files(*files(
             tmp_path, '/dev/none', 'Tag,Command,Address,Station,PLC_Type,Period\n'
