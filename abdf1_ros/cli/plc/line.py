@@ -93,5 +93,5 @@ def network_of(options: argparse.Namespace, duplex: str | None = None,
         raise ConfigurationError([Problem(
             '--via', f'{via} is our own Station, not a gateway; --own-station N changes ours')])
     # By radio there is no ACK, so --timeout limits the wait for the reply.
-    is_told = network.duplex is Duplex.RADIO and options.timeout is not None
+    is_told = network.duplex is Duplex.RADIO and getattr(options, 'timeout', None) is not None
     return replace(network, cmd_timeout=network.timeout) if is_told else network
