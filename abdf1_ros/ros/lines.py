@@ -24,6 +24,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import partial
+import math
+from operator import attrgetter
 import re
 import resource
 import threading
@@ -88,6 +90,7 @@ class RestartedLine(Line):
     - ``make``: makes the node
     - ``faults``: why the line cannot run; empty if it can
     - ``restarts``: number of internal errors that have ended the line
+    - ``due``: the monotonic clock value of its next start; infinite if none is planned
     """
 
     def __init__(self, name: str, make: Callable[[], BridgeNode]) -> None:
@@ -97,11 +100,12 @@ class RestartedLine(Line):
         self.restarts = 0
         self._make = make
         self.closing: threading.Thread | None = None
-        self._again: float | None = None
+        self.due = math.inf
         self._logger = get_logger(printable(name).strip('/').replace('/', '.'))
 
     def start(self) -> None:
         """Make the node and run it."""
+        self.due = math.inf
         self.make()
         self.take_callbacks()
         self.open_port()
@@ -121,22 +125,24 @@ class RestartedLine(Line):
             self._logger.fatal(printable(fault))
 
     def check(self) -> None:
-        """Publish what is due; restart the line after an internal error."""
+        """Publish what is due; end and restart the line after an internal error."""
         try:
             super().check()
         except Exception as error:  # a bug ends only this line
             self._begin_again(error)
+
+    @property
+    def is_due(self) -> bool:
+        """Return True if the line has to be started now."""
         is_closing = self.closing is not None and self.closing.is_alive()
-        if self._again is not None and time.monotonic() >= self._again and not is_closing:
-            self._again = None
-            self.start()
+        return time.monotonic() >= self.due and not is_closing
 
     def _begin_again(self, error: Exception) -> None:
         """End the node in a thread, as this may take seconds; plan its restart."""
         self.restarts += 1
         text = printable(str(error)) if isinstance(error, LinkFailed) else bug_text(error)
         self._logger.error(f'has ended by an internal error and is started again: {text}')
-        self._again = time.monotonic() + RESTART_AFTER
+        self.due = time.monotonic() + RESTART_AFTER
         if self.node is not None:
             gone = Line(self.node, self._callbacks)
             self.node, self._callbacks = None, None
@@ -148,6 +154,12 @@ class RestartedLine(Line):
         if self.closing is not None:
             self.closing.join(max(0.0, give_up - time.monotonic()))
         super().end_callbacks(give_up)
+
+
+def start_one(lines: Sequence[RestartedLine]) -> None:
+    """Start the line that is due for longest: each start holds up the checks of all lines."""
+    if waiting := [line for line in lines if line.is_due]:
+        min(waiting, key=attrgetter('due')).start()
 
 
 def _options(node: Node, arguments: Arguments) -> tuple[list[str], bool]:
@@ -244,7 +256,8 @@ class Lines:
             self._node.is_asked_again = False
             for line in self._lines:
                 if line.faults:
-                    line.start()
+                    line.due = min(line.due, now)
+        start_one(self._lines)
         if now >= self._next_status:
             self._next_status = now + _STATUS_PERIOD
             self._node.publish(self._lines)

@@ -29,7 +29,7 @@ from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.ros import lines as module
 from abdf1_ros.ros.bridge.node import BridgeNode
 from abdf1_ros.ros.bridge.port_owners import PortOwners
-from abdf1_ros.ros.lines import chosen, main, RestartedLine, sections
+from abdf1_ros.ros.lines import chosen, main, RestartedLine, sections, start_one
 from abdf1_ros.ros.parameters import files
 from abdf1_ros.ros.parameters.files import parameter_files, usable_files
 from abdf1_ros.ros.process import main as process
@@ -176,17 +176,19 @@ def test_line_is_started_again_once_after_each_internal_error(
         monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, 'RESTART_AFTER', 0.0)
     made: list[Exception] = []
-    ends = iter([AttributeError('a bug'), AttributeError('a bug'), ConfigurationError([])])
+    ends = iter([*4 * [AttributeError('a bug')], *2 * [ConfigurationError([])]])
 
     def make() -> BridgeNode:
         made.append(next(ends))
         raise made[-1]
 
-    line = RestartedLine('/hall/a', make)
+    line, other = lines = [RestartedLine('/hall/a', make), RestartedLine('/hall/b', make)]
     line.make()
-    for _ in range(5):
-        line.check()
-    assert (len(made), line.restarts) == (3, 2)
+    other.make()
+    for count in (3, 4, 5, 6, 6):  # each start holds up the other lines, so one comes at a time
+        start_one(lines)
+        assert len(made) == count
+    assert (line.restarts, other.restarts) == (2, 2)
     line.closing = threading.Timer(0.1, list)
     line.closing.start()
     line.end_callbacks(time.monotonic() + PATIENCE)
