@@ -40,7 +40,9 @@ A chunk has the seconds since ``begun``, its direction, and its bytes in hexadec
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from enum import Enum
+import fcntl
 import math
 from pathlib import Path
 from typing import NamedTuple
@@ -98,7 +100,8 @@ class CaptureWriter:
     ``limit`` is the most bytes on the disk. At half of it, the file is renamed to ``<path>.1`` and
     replaces an older file of this name. A capture that exists already is renamed at the start.
     Every line is given to the operating system at once, whole or not at all. Raises OSError, also
-    if ``path`` or ``<path>.1`` exists and is not a capture; such a file is not changed.
+    if ``path`` or ``<path>.1`` exists and is not a capture, or another writer is at it; such a file
+    is not changed.
     """
 
     def __init__(self, path: Path, limit: float = math.inf,
@@ -111,6 +114,8 @@ class CaptureWriter:
         for place in (path, Path(f'{path}.1')):
             if place.exists() and not may_replace(place, _MAGIC.encode()):
                 raise OSError(f'{place} exists and is not a capture; give another name')
+            if place.exists() and _is_locked(place):
+                raise OSError(f'{place} is being written by another; give another name')
         self._begin()
 
     def write(self, chunk: Chunk | str) -> None:
@@ -129,6 +134,8 @@ class CaptureWriter:
             self.path.replace(f'{self.path}.1')
         self.path.touch(0o640)  # not for every user: it holds the values of a plant
         self._file = self.path.open('wb', buffering=0)
+        with suppress(OSError):  # not every network file system has locks
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         self._written = 0
         self._put(self._head)
 
@@ -155,6 +162,16 @@ def may_replace(path: Path, head: bytes) -> bool:
         return False
     with path.open('rb') as file:
         return file.read(len(head)) in (b'', head)
+
+
+def _is_locked(path: Path) -> bool:
+    """Return True if a CaptureWriter, maybe of another program, writes this file now."""
+    with path.open('rb') as file, suppress(OSError):
+        try:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return True
+    return False
 
 
 def is_capture_line(line: str) -> bool:

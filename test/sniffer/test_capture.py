@@ -96,6 +96,8 @@ def test_older_capture_is_put_aside(tmp_path: Path) -> None:
     path = tmp_path / 'x'
     for chunk in CHUNKS:
         writer = capture.CaptureWriter(path)
+        with pytest.raises(OSError, match='x is being written by another; give another name'):
+            capture.CaptureWriter(path)  # such as that of another line of this process
         writer.write(chunk)
         writer.close()
     assert chunks_of(path) == CHUNKS[2:]

@@ -104,7 +104,9 @@ class BridgeNode(AnsweringNode):
         super().destroy_node()
 
     def _set_up(self, configuration: Configuration, graph: Graph) -> None:
-        self._opener = self._make_opener(configuration)
+        self._opener = PortOpener(
+            _port_settings(configuration),
+            lambda text: self.get_logger().debug(f'{printable(self.session.port)}: {text}'))
         self.writes = WriteTopics(self)
         names = graph.name_watch(self, is_spare=configuration.parameters.standby)
         self.surroundings = Surroundings(
@@ -132,18 +134,6 @@ class BridgeNode(AnsweringNode):
             while_sending=self.session.reads.publish_later_values)
         self.session.begin()
 
-    def _make_opener(self, configuration: Configuration) -> PortOpener:
-        parameters, network = configuration.parameters, configuration.network
-        opener = PortOpener(
-            _port_settings(configuration),
-            lambda text: self.get_logger().debug(f'{printable(self.session.port)}: {text}'))
-        if parameters.trace_file:
-            opener.trace(
-                parameters.trace_file, parameters.trace_limit * 1e6,
-                _head(network),
-                lambda text: self.get_logger().error(f'trace_file: {printable(text)}'))
-        return opener
-
     @property
     def has_failed(self) -> bool:
         """Return True if the link is broken, so that the node has to end."""
@@ -151,6 +141,12 @@ class BridgeNode(AnsweringNode):
 
     def start(self) -> None:
         """Open the port and begin to read."""
+        parameters = self.session.configuration.parameters
+        if parameters.trace_file:
+            self._opener.trace(
+                parameters.trace_file, parameters.trace_limit * 1e6,
+                _head(self.session.configuration.network),
+                lambda text: self.get_logger().error(f'trace_file: {printable(text)}'))
         self.link.start()
         if self.surroundings.is_offered:
             self.session.guests.start()
