@@ -301,6 +301,8 @@ class LinkThread(threading.Thread):
                 self._serve(port)
             if self.is_released:
                 end = RELEASED
+            elif not self._stopping:
+                end = _READ_AGAIN
             return True
         except OSError as error:
             end = _reason(error)
