@@ -269,27 +269,30 @@ class Lines:
         self._runner.destroy()
 
 
-def sections(path: str, own_name: str = NODE_NAME) -> list[str]:
+def sections(files: Sequence[str], own_name: str = NODE_NAME) -> dict[str, list[Place]]:
     """
-    Return the full names of the lines in a parameter file: each line has a section.
+    Return the full names of the lines in parameter files, with the places of their sections.
 
     A section with a wildcard is not a line, nor is the section of the process (``own_name``).
-    Raises ConfigurationError if the file cannot be read, or if a section comes twice: only one of
-    the two would run.
+    Raises ConfigurationError if a file cannot be read, or has a section twice: only one of the two
+    would run.
     """
-    found: dict[str, int] = {}
+    found: dict[str, list[Place]] = {}
     problems = []
-    for name, line, _ in node_sections(parameter_tree(path)):
-        if _short(name) in (NODE_NAME, own_name) or '*' in name:
-            continue
-        first = found.setdefault(name, line)
-        if first != line:
-            problems.append(Problem(Place(path, line), (
-                f'{printable(name)} has a section already, in line {first}; '
-                'give each DF1 line a name of its own')))
+    for path in dict.fromkeys(files):
+        for name, line, _ in node_sections(parameter_tree(path)):
+            if _short(name) in (NODE_NAME, own_name) or '*' in name:
+                continue
+            places = found.setdefault(name, [])
+            if places and places[-1].file == path:
+                problems.append(Problem(Place(path, line), (
+                    f'{printable(name)} has a section already, in line {places[-1].line}; '
+                    'give each DF1 line a name of its own')))
+            else:
+                places.append(Place(path, line))
     if problems:
         raise ConfigurationError(problems)
-    return [*found]
+    return found
 
 
 def chosen(names: Sequence[str], wanted: Sequence[str]) -> list[str]:
@@ -353,8 +356,13 @@ def _own_name(given: Sequence[str]) -> str:
 
 def _make(given: Sequence[str]) -> Program:
     own_name, files = _own_name(given), parameter_files(given)
-    names = [*dict.fromkeys(name for path in files for name in sections(path, own_name))]
+    names = sections(files, own_name)
     _allow_files()
     arguments = Arguments(files, others=names)
     node = LinesNode(arguments)
-    return Lines(chosen(names, node.wanted), node, arguments)
+    for name, (first, *others) in names.items():
+        for place in others:
+            node.get_logger().warning(printable(
+                f'{place}: {name} has a section in {first} too: it is one line, with the later of '
+                'two values'))
+    return Lines(chosen([*names], node.wanted), node, arguments)

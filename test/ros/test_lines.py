@@ -77,14 +77,14 @@ def yaml_file(folder: Path, text: str) -> str:
     ('lines:\n  ros__parameters: {lines: [x]}\nx:\n  ros__parameters: {}', ['/x']),
     ('', [])])
 def test_nodes_of_a_parameter_file(tmp_path: Path, text: str, expected: list[str]) -> None:
-    assert sections(yaml_file(tmp_path, text)) == expected
+    assert [*sections([yaml_file(tmp_path, text)])] == expected
 
 
 def test_two_sections_of_one_name_are_a_fault(tmp_path: Path) -> None:
     line = '/hall/a:\n  ros__parameters:\n    port: x\n'
     path = yaml_file(tmp_path, f'{line}hall:\n  b:\n    ros__parameters: {{}}\n{line}')
     with pytest.raises(ConfigurationError) as error:
-        sections(path)
+        sections([path])
     assert str(error.value) == (
         f'{path}:7: /hall/a has a section already, in line 1; give each DF1 line a name '
         'of its own')
@@ -94,7 +94,7 @@ def test_two_sections_of_one_name_are_a_fault(tmp_path: Path) -> None:
 def test_parameter_file_that_cannot_be_read(tmp_path: Path, text: str | None) -> None:
     path = str(tmp_path / 'nothing') if text is None else yaml_file(tmp_path, text)
     with pytest.raises(ConfigurationError, match=path):
-        sections(path)
+        sections([path])
 
 
 @pytest.mark.parametrize(('text', 'expected'), [
@@ -288,9 +288,11 @@ def line_status(plant: Plant, level: bytes) -> dict[str, str]:
     return details(until_status(plant.observer.diagnostics(''), 'lines', level))
 
 
-def test_each_line_is_a_node_of_its_own(plant: Plant) -> None:
+def test_each_line_is_a_node_of_its_own(plant: Plant, capfd: Output) -> None:
     second = yaml_file(plant.folder / 'b', '/hall/b: {ros__parameters: {write_timeout: 3.5}}')
     plant.start('--params-file', second, reads='abc')
+    assert f'{second}:1: /hall/b has a section in {plant.folder}/lines.yaml:5 too: it is one ' \
+        'line, with the later of two values' in capfd.readouterr().err
     assert get_parameters(plant.observer, 'net.com_port', 'write_timeout', node='/hall/b') == [
         plant.plcs['b'].port, 3.5]
     diagnostics = plant.observer.diagnostics(plant.plcs['c'].port)
