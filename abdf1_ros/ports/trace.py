@@ -56,13 +56,13 @@ class Trace:
         self._path = path
         self._on_error = on_error
         self._writer = CaptureWriter(Path(path), limit, settings)
-        self._waiting: SimpleQueue[Chunk | str | None] = SimpleQueue()
+        self._waiting: SimpleQueue[Chunk | str | dict[str, str] | None] = SimpleQueue()
         self._lost = self._told = 0
         self._thread = threading.Thread(target=self._run, name='trace', daemon=True)
         self._thread.start()
 
-    def write(self, chunk: Chunk | str) -> None:
-        """Queue a chunk or a setting for the disk, from any thread; no effect after an error."""
+    def write(self, chunk: Chunk | str | dict[str, str]) -> None:
+        """Queue a chunk or settings for the disk, from any thread; no effect after an error."""
         if self._waiting.qsize() < MOST_WAITING:
             self._waiting.put(chunk)
         else:
@@ -144,9 +144,15 @@ class PortOpener:
         self._trace: Trace | None = None
         self._begun = 0.0
 
-    def use(self, settings: PortSettings) -> bool:
-        """Open with these settings from now on; return True if they differ from the last ones."""
+    def use(self, settings: PortSettings, head: dict[str, str]) -> bool:
+        """
+        Open with these settings from now on; return True if they differ from the last ones.
+
+        ``head`` is that of ``trace``.
+        """
         before, self.settings = self.settings, settings
+        if self._trace is not None:
+            self._trace.write(self._head(head))
         return settings != before
 
     def errors(self) -> dict[str, int]:
@@ -156,13 +162,15 @@ class PortOpener:
     def trace(self, path: str, limit: float, head: dict[str, str],
               on_error: Callable[[str], None]) -> None:
         """Begin a capture of at most ``limit`` bytes; ``head`` has the settings of the line."""
-        settings = {'begun': begun_now(), 'port': self.settings.name,
-                    'baud': str(self.settings.baud), **head}
+        settings = {'begun': begun_now(), **self._head(head)}
         self._begun = time.monotonic()
         try:
             self._trace = Trace(path, settings, on_error, limit)
         except OSError as error:
             on_error(f'{error}; nothing is recorded')
+
+    def _head(self, head: dict[str, str]) -> dict[str, str]:
+        return {'port': self.settings.name, 'baud': str(self.settings.baud), **head}
 
     def note_guest(self, place: str, command: Packet) -> None:
         """Record in the capture that the command sent now is from a guest."""

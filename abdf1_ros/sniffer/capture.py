@@ -108,8 +108,7 @@ class CaptureWriter:
                  settings: Mapping[str, str] | None = None) -> None:
         self.path = path
         self._limit = limit / 2
-        self._head = '\n'.join([_FIRST_LINE, *(
-            setting_line(name, value) for name, value in (settings or {}).items())])
+        self._settings = dict(settings or {})
         self._written = 0
         for place in (path, Path(f'{path}.1')):
             if place.exists() and not may_replace(place, _MAGIC.encode()):
@@ -118,8 +117,13 @@ class CaptureWriter:
                 raise OSError(f'{place} is being written by another; give another name')
         self._begin()
 
-    def write(self, chunk: Chunk | str) -> None:
-        """Write a chunk, or a line from ``setting_line``."""
+    def write(self, chunk: Chunk | str | dict[str, str]) -> None:
+        """Write a chunk, a line from ``setting_line``, or settings of the next files too."""
+        if isinstance(chunk, dict):
+            self._settings |= chunk
+            for name, value in chunk.items():
+                self.write(setting_line(name, value))
+            return
         line = str(chunk)
         if self._written + len(line) + 1 > self._limit:
             self._file.close()
@@ -137,7 +141,8 @@ class CaptureWriter:
         with suppress(OSError):  # not every network file system has locks
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         self._written = 0
-        self._put(self._head)
+        self._put('\n'.join([_FIRST_LINE, *(
+            setting_line(name, value) for name, value in self._settings.items())]))
 
     def _put(self, text: str) -> None:
         left = line = f'{text}\n'.encode('ascii')

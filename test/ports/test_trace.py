@@ -159,8 +159,9 @@ def test_opener_records_across_openings(tmp_path: Path, monkeypatch: pytest.Monk
     monkeypatch.setattr(trace_module, 'time', SimpleNamespace(monotonic=iter([-1e6]).__next__))
     pty = Pty(tmp_path / 'line')
     opener = PortOpener(PortSettings(str(pty.name), baud=19200))
-    opener.trace(str(tmp_path / 'x'), 1e6, {'check': 'CRC', 'duplex': 'full'}, pytest.fail)
-    for data in (b'\x01', b'\x02'):
+    opener.trace(str(tmp_path / 'x'), 1e6, {'check': 'BCC', 'duplex': 'half'}, pytest.fail)
+    for data, check in ((b'\x01', 'BCC'), (b'\x02', 'CRC')):
+        opener.use(opener.settings, {'check': check, 'duplex': 'full'})  # as new files have it
         port = opener.open()
         port.write(data)
         assert pty.read(1) == data

@@ -121,6 +121,6 @@ def listen(ros: Observer, tmp_path: Path, ptys: list[Pty], *, is_full: bool) -> 
     for pty in ptys:
         assert not select.select([pty.fileno()], [], [], 0.1)[0], os.read(pty.fileno(), 100)
     capture = (tmp_path / 'line.cap').read_text()
-    assert 'check' in capture and 'duplex' not in capture  # sniff finds that out
+    assert '# check' in capture and '# duplex: auto' in capture  # sniff finds that out
     directions = {line.split()[1] for line in capture.splitlines() if not line.startswith('#')}
     assert directions == ({'>', '<'} if is_full else {'?'})

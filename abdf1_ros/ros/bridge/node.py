@@ -228,7 +228,8 @@ class BridgeNode(AnsweringNode):
         self.session = session
         self.writes.give_to(session.writers)
         if not self.link.exchange(session.driver.machine, session.reads.publish_later_values,
-                                  self._opener.use(_port_settings(configuration))):
+                                  self._opener.use(_port_settings(configuration),
+                                                   _head(configuration.network))):
             return False
         before.end()
         self.session.begin()
@@ -276,8 +277,8 @@ def _port_settings(configuration: Configuration) -> PortSettings:
 
 def _head(network: Network) -> dict[str, str]:
     """Return the settings for the head of a capture; sniff finds out missing settings."""
-    duplex = {} if network.line_mode.only_listens else {'duplex': network.duplex.name.lower()}
-    return {'check': network.checksum.value, **duplex}
+    return {'check': network.checksum.value,
+            'duplex': 'auto' if network.line_mode.only_listens else network.duplex.name.lower()}
 
 
 def end_together(nodes: Sequence[BridgeNode], patience: float = _LONGEST_PUBLISH) -> None:
