@@ -100,8 +100,8 @@ class CaptureWriter:
     ``limit`` is the most bytes on the disk. At half of it, the file is renamed to ``<path>.1`` and
     replaces an older file of this name. A capture that exists already is renamed at the start.
     Every line is given to the operating system at once, whole or not at all. Raises OSError, also
-    if ``path`` or ``<path>.1`` exists and is not a capture, or another writer is at it; such a file
-    is not changed.
+    if ``path`` or ``<path>.1`` exists and is not a capture, or is being written by another; such a
+    file is not changed.
     """
 
     def __init__(self, path: Path, limit: float = math.inf,

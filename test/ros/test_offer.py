@@ -116,6 +116,21 @@ class Recorder:
         return [note.replace('~/read/', '') for note in self.notes]
 
 
+def test_value_that_is_read_while_its_topic_begins_stays_the_last() -> None:
+    row, sent, left = make_mapping('N7:0'), list[object](), [array('h', [8])]
+
+    def publish(message: object) -> None:
+        if left:
+            topics.read(row, left.pop())  # by the link, before the message goes out
+        sent.append(message)
+
+    node: Any = SimpleNamespace(create_publisher=lambda *_, **__: SimpleNamespace(publish=publish))
+    topics = ReadTopics(node, {})
+    topics.read(row, array('h', [7]))
+    topics.offer({row: SimpleNamespace(stale_time=1.0)})  # type: ignore[dict-item]
+    assert sent[0] == sent[-1] != sent[1]
+
+
 def test_values_of_a_line_that_was_lost_do_not_come_when_it_is_back() -> None:
     node: Any = Recorder()
     points: dict[Mapping, Any] = {make_mapping(f'N7:{number}', tag=f'n{number}'): SimpleNamespace(

@@ -17,6 +17,7 @@
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
+from threading import Lock
 from types import SimpleNamespace
 from typing import Any
 from unittest.mock import MagicMock, Mock
@@ -194,9 +195,13 @@ def test_line_of_a_device_server_is_ours_when_any_station_has_answered_since_it_
         monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr('abdf1_ros.ros.bridge.session.line_time', lambda: 5.0)
     events, session = Mock(), object.__new__(BridgeSession)
-    around = Mock(active_words=None, **{'link.is_released': False})
-    stations = MagicMock(**{'words.return_value': [6], '__iter__.side_effect': lambda: iter(
-        [SimpleNamespace(last_heard=when) for when in heard])})
+    lock, tables = Lock(), list[int]()  # the link and the executor publish tables
+    around = Mock(active_words=None, active_lock=lock, **{
+        'link.is_released': False, 'active_stations.publish.side_effect': lambda table:
+        tables.append(table.data[0] * lock.locked())})
+    stations = MagicMock(**{
+        'words.side_effect': lambda: [6 * lock.locked()], '__iter__.side_effect': lambda: iter(
+            [SimpleNamespace(last_heard=when) for when in heard])})
     vars(session).update(_surroundings=around, _port_text='', events=events,
                          driver=Mock(stations=stations), configuration=Mock(port=port))
     for is_open in (True, False, True):
@@ -204,8 +209,7 @@ def test_line_of_a_device_server_is_ours_when_any_station_has_answered_since_it_
         for _ in range(2):
             session.port_changed(around.link.state)
         assert session.has_line is (is_open and has_line)
-    tables = around.active_stations.publish.call_args_list
-    assert [call.args[0].data[0] for call in tables] == [6, 0, 6]  # no station without a port
+    assert tables == [6, 0, 6]  # no station without a port
     assert events.port_changed.call_count == 3  # late replies are no errors
     assert [*map(str, events.notes.mock_calls)] == [
         f"call.{level}('the port', '{port}: {is_open}')"

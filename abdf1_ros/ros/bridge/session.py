@@ -25,6 +25,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 import math
 import random
+from threading import Lock
 import time
 
 from abdf1_ros.df1.packet import BROADCAST
@@ -90,6 +91,7 @@ class Surroundings:
     is_offered: bool = False
     published: dict[str, ReadTopic] = field(default_factory=dict)
     active_words: Sequence[int] = ()
+    active_lock: Lock = field(default_factory=Lock)
     link: LinkThread = field(init=False)
 
     def __post_init__(self) -> None:
@@ -260,11 +262,12 @@ class BridgeSession:
     def _publish_active(self) -> None:
         """Publish the Active Node Table if it changes; with a closed port no station is active."""
         surroundings = self._surroundings
-        words = self.driver.stations.words() if surroundings.link.state.is_open else [0] * 16
-        if words != surroundings.active_words:
-            surroundings.active_words = words
-            surroundings.active_stations.publish(
-                UInt16MultiArray(layout=ACTIVE_LAYOUT, data=words))
+        with surroundings.active_lock:  # executor and link: the newest table comes last
+            words = self.driver.stations.words() if surroundings.link.state.is_open else [0] * 16
+            if words != surroundings.active_words:
+                surroundings.active_words = words
+                surroundings.active_stations.publish(
+                    UInt16MultiArray(layout=ACTIVE_LAYOUT, data=words))
 
     def port_changed(self, state: PortState) -> None:
         """Log the state of the port."""

@@ -113,8 +113,12 @@ class ReadTopics:
                 self._node.destroy_publisher(topic.publisher)
         for mapping, point in self._to_come:
             topic = self._topics[mapping.topic] = self._topic(mapping, point, None)
-            if mapping.topic in self.latest:  # a subscriber may get it twice
-                topic.publisher.publish(topic.encode(self.latest[mapping.topic]))
+            published = None
+            # Again if the link has published newer values meanwhile: the last ones are latched.
+            while (latest := self.latest.get(mapping.topic)) is not None \
+                    and latest is not published:
+                published = latest
+                topic.publisher.publish(topic.encode(latest))
         self._to_come.clear()
         self._published.clear()
         self._published.update(self._topics)
