@@ -42,21 +42,29 @@ class Bit:
     - ``is_on``: the bit is an alarm now
     - ``since``: clock value (s) of its last change; None if it never changed
     - ``times``: how often the alarm began
-    - ``is_news``: it was an alarm at some time since the last status
+    - ``reads``: in how many reads it was an alarm
+    - ``judged``, ``told``: ``reads`` when it was judged last, and as a status has shown it
     """
 
     place: str
     is_on: bool = False
     since: float | None = None
     times: int = 0
-    is_news: bool = False
+    reads: int = 0
+    judged: int = 0
+    told: int = 0
 
     def take(self, is_on: bool, now: float) -> None:
         """Record whether the bit, as read at ``now``, is an alarm."""
         if is_on is not self.is_on:
             self.is_on, self.since = is_on, now
             self.times += is_on
-        self.is_news |= is_on
+        self.reads += is_on
+
+    def judge(self) -> bool:
+        """Return True if the bit is an alarm, or was one since the last status."""
+        self.judged = self.reads
+        return self.is_on or self.judged > self.told
 
     def text(self, now: float) -> str:
         """Return the history of the bit as a text."""
@@ -88,7 +96,7 @@ class AlarmStatus:
         state = self._point.freshness(now)
         if not state.is_usable:
             return FRESHNESS_LEVELS[state], f'unknown: its row is {state.value}{self._description}'
-        shown = [f'{bit.place} {bit.text(now)}' for bit in self._bits if bit.is_on or bit.is_news]
+        shown = [f'{bit.place} {bit.text(now)}' for bit in self._bits if bit.judge()]
         if not shown:
             return OK, f'no alarm{self._description}'
         return _LEVELS[self._alarm.level], f'{first(shown)}{self._description}'
@@ -101,9 +109,9 @@ class AlarmStatus:
         return {bit.place: bit.text(now) for bit in self._bits}
 
     def forget(self) -> None:
-        """Forget alarms that are over: a status has shown them."""
+        """Forget alarms that are over: a status has shown all that were judged."""
         for bit in self._bits:
-            bit.is_news = False
+            bit.told = bit.judged
 
 
 class Alarms:
