@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from typing import Protocol
 
+from abdf1_ros.messages import Message
 from abdf1_ros.ros.diagnostics.line import deaf_text, LineView
 from abdf1_ros.ros.diagnostics.link import changed_text
 from abdf1_ros.ros.diagnostics.log import ERROR, INFO, News, WARN
@@ -52,23 +53,30 @@ class NewFaults:
 
 
 class DeafStations:
-    """Reports once that a station takes no commands, and once that it takes commands again."""
+    """Reports once that a station takes no commands, then that it is silent, or takes them."""
 
     def __init__(self, line: LineView) -> None:
         self._line = line
-        self._told: list[int] = []
+        self._told: dict[int, News] = {}
 
     def look(self, now: float) -> list[News]:
-        """Return the stations that stopped answering commands, or answer them again."""
-        before, deaf = self._told, self._line.deaf_stations(now)
-        self._told = deaf
-        return [
-            *(News(WARN, f'commands to {number}', f'{deaf_text(number)} Stop the node and run '
-                   '"plc detect" to find out') for number in deaf if number not in before),
-            *(News(INFO, f'commands to {station.number}',
-                   f'station {station.number} answers commands')
-              for station in self._line.driver.stations
-              if station.number in before and station.number not in deaf and station.active)]
+        """Return what has changed since the last look."""
+        deaf, news = self._line.deaf_stations(now), []
+        for station in self._line.driver.stations:
+            number, about = station.number, f'commands to {station.number}'
+            if number in deaf:
+                found = News(WARN, about, f'{deaf_text(number)} Stop the node and run '
+                             '"plc detect" to find out')
+            elif station.takes_no_commands and not station.active:
+                found = News(ERROR, about, Message.ERR_INACTIVE_STATION.entry(number))
+            elif number in self._told and station.active and not station.takes_no_commands:
+                found = News(INFO, about, f'station {number} answers commands')
+            else:
+                continue
+            if found != self._told.get(number):
+                news.append(found)
+            self._told[number] = found
+        return news
 
 
 def watches_of(line: LineView, port: str, seen: Seen, guests: Sequence[GuestLine],
