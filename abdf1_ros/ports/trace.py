@@ -148,7 +148,7 @@ class PortOpener:
         """
         Open with these settings from now on; return True if they differ from the last ones.
 
-        ``head`` is that of ``trace``.
+        ``head`` has the settings of the line, for a capture.
         """
         before, self.settings = self.settings, settings
         if self._trace is not None:

@@ -17,7 +17,6 @@
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
-from threading import Lock
 from types import SimpleNamespace
 from typing import Any
 from unittest.mock import MagicMock, Mock
@@ -195,13 +194,12 @@ def test_line_of_a_device_server_is_ours_when_any_station_has_answered_since_it_
         monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr('abdf1_ros.ros.bridge.session.line_time', lambda: 5.0)
     events, session = Mock(), object.__new__(BridgeSession)
-    lock, tables = Lock(), list[int]()  # the link and the executor publish tables
-    around = Mock(active_words=None, active_lock=lock, **{
-        'link.is_released': False, 'active_stations.publish.side_effect': lambda table:
-        tables.append(table.data[0] * lock.locked())})
-    stations = MagicMock(**{
-        'words.side_effect': lambda: [6 * lock.locked()], '__iter__.side_effect': lambda: iter(
-            [SimpleNamespace(last_heard=when) for when in heard])})
+    around = Mock(active_words=None, **{'link.is_released': False})
+    stations = MagicMock(**{'words.return_value': [6], '__iter__.side_effect': lambda: iter(
+        [SimpleNamespace(last_heard=when) for when in heard])})
+    # a station comes while the first table is published, maybe after that of the other thread
+    around.active_stations.publish.side_effect = lambda table: setattr(
+        stations.words, 'return_value', [7])
     vars(session).update(_surroundings=around, _port_text='', events=events,
                          driver=Mock(stations=stations), configuration=Mock(port=port))
     for is_open in (True, False, True):
@@ -209,7 +207,8 @@ def test_line_of_a_device_server_is_ours_when_any_station_has_answered_since_it_
         for _ in range(2):
             session.port_changed(around.link.state)
         assert session.has_line is (is_open and has_line)
-    assert tables == [6, 0, 6]  # no station without a port
+    tables = around.active_stations.publish.call_args_list
+    assert [call.args[0].data[0] for call in tables] == [6, 7, 0, 7]  # none without a port
     assert events.port_changed.call_count == 3  # late replies are no errors
     assert [*map(str, events.notes.mock_calls)] == [
         f"call.{level}('the port', '{port}: {is_open}')"

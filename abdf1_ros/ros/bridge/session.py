@@ -25,7 +25,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 import math
 import random
-from threading import Lock
 import time
 
 from abdf1_ros.df1.packet import BROADCAST
@@ -91,7 +90,6 @@ class Surroundings:
     is_offered: bool = False
     published: dict[str, ReadTopic] = field(default_factory=dict)
     active_words: Sequence[int] = ()
-    active_lock: Lock = field(default_factory=Lock)
     link: LinkThread = field(init=False)
 
     def __post_init__(self) -> None:
@@ -261,13 +259,15 @@ class BridgeSession:
 
     def _publish_active(self) -> None:
         """Publish the Active Node Table if it changes; with a closed port no station is active."""
-        surroundings = self._surroundings
-        with surroundings.active_lock:  # executor and link: the newest table comes last
-            words = self.driver.stations.words() if surroundings.link.state.is_open else [0] * 16
-            if words != surroundings.active_words:
-                surroundings.active_words = words
-                surroundings.active_stations.publish(
-                    UInt16MultiArray(layout=ACTIVE_LAYOUT, data=words))
+        surroundings, published = self._surroundings, self._surroundings.active_words
+        # Again if the other thread, executor or link, has published a newer table meanwhile.
+        while (words := self._active_words()) != published:
+            published = surroundings.active_words = words
+            surroundings.active_stations.publish(
+                UInt16MultiArray(layout=ACTIVE_LAYOUT, data=words))
+
+    def _active_words(self) -> Sequence[int]:
+        return self.driver.stations.words() if self._surroundings.link.state.is_open else [0] * 16
 
     def port_changed(self, state: PortState) -> None:
         """Log the state of the port."""

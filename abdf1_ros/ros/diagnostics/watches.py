@@ -53,7 +53,7 @@ class NewFaults:
 
 
 class DeafStations:
-    """Reports once that a station takes no commands, then that it is silent, or takes them."""
+    """Reports once that a station takes no commands, and once what becomes of this station."""
 
     def __init__(self, line: LineView) -> None:
         self._line = line
