@@ -86,6 +86,11 @@ def milliseconds(seconds: float | None, digits: int = 0) -> str:
     return 'unknown' if seconds is None else f'{seconds * 1000:.{digits}f} ms'
 
 
+def age_text(since: float, now: float) -> str:
+    """Return the seconds since a clock value; another thread may have set it after ``now``."""
+    return f'{max(0.0, now - since):.1f} s'
+
+
 def utc_text(seconds: float) -> str:
     """Return a time (s since 1970) as text in UTC, with milliseconds."""
     return datetime.fromtimestamp(seconds, UTC).isoformat(timespec='milliseconds')

@@ -78,6 +78,7 @@ def test_each_value_of_an_array_has_a_key(
 
 @for_all(('values', 'age', 'error', 'level', 'message'), [
     (array('h', [7]), 2.0, None, OK, 'OK: 7, 2.0 s ago'),  # late, and not stale yet
+    (array('h', [7]), -0.04, None, OK, 'OK: 7, 0.0 s ago'),  # read while the snapshot is made
     (array('h', [7]), 9.0, None, STALE, 'STALE: 7, 9.0 s ago'),
     (array('h', [7]), 9.0, 'no reply', ERROR, 'ERROR: no reply; 7, 9.0 s ago'),
     (array('h', [7]), 9.0, 'not in RUN', ERROR, 'ERROR: not in RUN; 7, 9.0 s ago'),

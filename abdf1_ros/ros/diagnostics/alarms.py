@@ -29,7 +29,7 @@ from abdf1_ros.ros.diagnostics.mappings import FRESHNESS_LEVELS
 from abdf1_ros.ros.diagnostics.status import ERROR, Judgement, OK, WARN
 from abdf1_ros.settings.alarms import AlarmLevel
 from abdf1_ros.settings.mapping import Mapping
-from abdf1_ros.text import counted, first
+from abdf1_ros.text import age_text, counted, first
 
 _LEVELS = {AlarmLevel.WARN: WARN, AlarmLevel.ERROR: ERROR}
 
@@ -71,8 +71,8 @@ class Bit:
         if self.since is None:
             return 'never'
         times = counted(self.times, 'time')
-        return f'for {now - self.since:.1f} s, {times}' if self.is_on else \
-            f'{times}, gone {now - self.since:.1f} s ago'
+        return f'for {age_text(self.since, now)}, {times}' if self.is_on else \
+            f'{times}, gone {age_text(self.since, now)} ago'
 
 
 class AlarmStatus:

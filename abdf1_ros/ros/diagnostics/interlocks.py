@@ -26,7 +26,7 @@ from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.plan.bounds import Bound, Times
 from abdf1_ros.ros.diagnostics.stations import processor_fault
 from abdf1_ros.ros.diagnostics.status import ERROR, Judgement, OK, Seen, WARN, with_age
-from abdf1_ros.text import milliseconds
+from abdf1_ros.text import age_text, milliseconds
 
 
 class _InControl(IntEnum):
@@ -94,10 +94,10 @@ class InterlockStatus:
             return _InControl.NOT_IN_CONTROL, f'not in control: {reason}'
         begun, point = self._since[beat.mapping.tag], self._bits.get(beat.mapping.tag)
         if point is None:
-            return _InControl.COUNTS, f'heartbeat counts (for {now - begun:.1f} s)'
+            return _InControl.COUNTS, f'heartbeat counts (for {age_text(begun, now)})'
         tag, (control, reason) = point.mapping.tag, self._confirmed(point, begun, now)
         self._seen(tag, control is _InControl.IN_CONTROL, now)
-        return control, reason or f'in control for {now - max(begun, self._since[tag]):.1f} s'
+        return control, reason or f'in control for {age_text(max(begun, self._since[tag]), now)}'
 
     def _confirmed(self, point: ReadPoint, begun: float, now: float) -> tuple[_InControl, str]:
         """Return if a bit confirms a heartbeat that counts since ``begun`` (s); if not, why."""
@@ -132,7 +132,7 @@ class InterlockStatus:
             **{f'bound of {bound.mapping.tag}': _bound(bound) for bound in self._bounds}}
 
     def _beat(self, beat: HeartbeatRow, now: float) -> str:
-        age = '' if beat.confirmed is None else f', {now - beat.confirmed:.1f} s ago'
+        age = '' if beat.confirmed is None else f', {age_text(beat.confirmed, now)} ago'
         reason = self._why_not(beat, now)
         return f'heartbeat {beat.value}{age}; ' \
             + (f'does not count: {reason}' if reason else 'counts')

@@ -31,7 +31,7 @@ from abdf1_ros.ports.link_thread import RELEASED
 from abdf1_ros.ros.diagnostics.line import LineView, takes_in_silence
 from abdf1_ros.ros.diagnostics.status import ERROR, Judgement, OK, period_of, Seen, WARN, with_age
 from abdf1_ros.settings.network import Network
-from abdf1_ros.text import counted, milliseconds
+from abdf1_ros.text import age_text, counted, milliseconds
 
 # The status warns after this many seconds without a poll of the master.
 _LONGEST_UNPOLLED = 5.0
@@ -228,7 +228,7 @@ def _carried(driver: Driver, now: float) -> dict[str, str]:
         return {}
     known = sorted(driver.overheard.carried.values(), key=attrgetter('last'))[-_MOST_CARRIED:]
     return {f'heard of station {read.station}: {read.text}':
-            f'{read.count} times, last {now - read.last:.1f} s ago'
+            f'{read.count} times, last {age_text(read.last, now)} ago'
             for read in sorted(known, key=attrgetter('station', 'text'))}
 
 

@@ -23,7 +23,7 @@ from abdf1_ros.driver.reads.point import Freshness, ReadPoint
 from abdf1_ros.problems import Problem
 from abdf1_ros.ros.diagnostics.load import FullLine, SlowRows
 from abdf1_ros.ros.diagnostics.status import ERROR, Judgement, OK, WARN
-from abdf1_ros.text import counted
+from abdf1_ros.text import age_text, counted
 
 # Most faults of left-out rows that each status repeats; ``check`` shows them all.
 _MOST_LEFT_OUT = 20
@@ -95,6 +95,6 @@ def _describe(point: ReadPoint, now: float) -> str:
            f'{point.mapping.station}'
     text += ', never read' if age is None else f', last read {age:.1f} s ago'
     if point.withheld:
-        text += f'; {point.withheld}, for {now - point.withheld_since:.1f} s; ' \
+        text += f'; {point.withheld}, for {age_text(point.withheld_since, now)}; ' \
                 f'times withheld: {point.withholdings}'
     return f'{text}; {point.error}' if point.error else text

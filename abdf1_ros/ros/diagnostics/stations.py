@@ -26,6 +26,7 @@ from abdf1_ros.pccc.status import status_text
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ros.diagnostics.line import deaf_text, LineView, takes_in_silence
 from abdf1_ros.ros.diagnostics.status import ERROR, Judgement, OK, Seen, WARN, with_age
+from abdf1_ros.text import age_text
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
@@ -49,7 +50,7 @@ def health_values(health: StationHealth, now: float) -> dict[str, str]:
     values = {'processor': health.processor, 'mode': 'unknown', 'faults': 'unknown'}
     identity = health.identity
     if identity is not None and health.told is not None:
-        values['mode'] = f'{identity.mode_text or "none"} ({now - health.told:.1f} s ago)'
+        values['mode'] = f'{identity.mode_text or "none"} ({age_text(health.told, now)} ago)'
         values['faults'] = '; '.join((*identity.faults, *identity.remarks)) or 'none'
     if health.no_counters:
         values['link counters'] = health.no_counters
@@ -73,13 +74,13 @@ class StationStatus:
         if line.is_deaf(station, now):
             return WARN, deaf_text(station.number)
         if not station.active:
-            since = now - (station.silent_since or now)
+            since = age_text(station.silent_since or now, now)
             via = line.driver.stations.via(station.number)
             is_passed_on = via != station.number and line.driver.stations[via].active
             but = f'; its gateway, station {via}, answers' if is_passed_on else ''
             if line.is_refused:
                 but = '; it answers DLE NAK to all: is Error_Code right?'
-            return ERROR, f'station {station.number} inactive for {since:.1f} s{but}'
+            return ERROR, f'station {station.number} inactive for {since}{but}'
         if station.local_status:
             return WARN, f'commands do not get to station {station.number}: ' \
                          f'{status_text(station.local_status)}'
@@ -100,7 +101,7 @@ class StationStatus:
         return {
             **({} if via == station.number else {'gateway': str(via)}),
             'active': 'yes' if station.active else 'no',
-            'last answer': 'none yet' if heard is None else f'{now - heard:.1f} s ago',
+            'last answer': 'none yet' if heard is None else f'{age_text(heard, now)} ago',
             'last TNS': 'none yet' if station.last_tns is None else f'0x{station.last_tns:04X}',
             'replies': str(station.replies),
             'transactions without reply': str(station.failures),

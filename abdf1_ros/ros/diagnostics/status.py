@@ -22,7 +22,7 @@ from typing import Protocol
 
 from abdf1_ros.messages import Event
 from abdf1_ros.pccc.values import Values
-from abdf1_ros.text import printable
+from abdf1_ros.text import age_text, printable
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
@@ -91,4 +91,4 @@ def period_of(seen: Seen) -> dict[str, str]:
 
 def with_age(moment: Moment | None, now: float) -> str:
     """Return an event, and how long ago it happened."""
-    return 'none' if moment is None else f'{moment[0]} ({now - moment[1]:.1f} s ago)'
+    return 'none' if moment is None else f'{moment[0]} ({age_text(moment[1], now)} ago)'

@@ -25,7 +25,7 @@ from abdf1_ros.driver.write import show
 from abdf1_ros.pccc.values import Values, ValueType
 from abdf1_ros.ros.diagnostics.status import WORDS
 from abdf1_ros.settings.mapping import Mapping
-from abdf1_ros.text import printable, utc_text, value_text
+from abdf1_ros.text import age_text, printable, utc_text, value_text
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 # Arrays with more values are shown as one text, cut short.
@@ -83,9 +83,9 @@ class _ValueRow:
         if values is None or read is None:
             texts = texts or [freshness.value]
         else:
-            texts.append(f'{_text(values)}, {now - read:.1f} s ago')
+            texts.append(f'{_text(values)}, {age_text(read, now)} ago')
             pairs = [*self._values(values), ('stamp', utc_text(begun + read)),
-                     ('age_ms', f'{(now - read) * 1000:.0f}')]
+                     ('age_ms', f'{max(0.0, now - read) * 1000:.0f}')]
         return DiagnosticStatus(
             level=level, name=self._tag, hardware_id=self._place,
             message=f'{WORDS[level]}: {printable("; ".join(texts))}',
