@@ -220,8 +220,9 @@ def test_files_that_cannot_be_taken_leave_messages_to_the_old_driver(
     monkeypatch.setattr('abdf1_ros.ros.bridge.session.LinkCounterService', fail)
     with pytest.raises(KeyError):
         bench.node.hand_over(bench.node.session.configuration)
+    bench.ros.until(lambda: bench.node.session.driver.is_online, 'the port')
     publisher.publish(Int16MultiArray(data=[5, 6]))
-    assert results.next().message == 'not written: refused: this node ends'
+    assert results.next().message == 'written'
 
 
 # What a reload leaves: what is found and told then is what a fresh start would find and tell

@@ -217,6 +217,8 @@ class BridgeNode(AnsweringNode):
         """
         Hand the line over to new files; return False if the link does not accept them.
 
+        If the new session cannot be made, the old one goes on, after the port was opened again.
+
         The order matters:
         1. Inform the PLCs: to a PLC, new files are an end and a start.
         2. Make the new session while the old session has the line: topics of unchanged rows stay.
@@ -224,7 +226,15 @@ class BridgeNode(AnsweringNode):
         4. Let guests connect, and give up the old port.
         """
         tell_plcs([self.session], 'goes on with new files', HAND_OVER)
-        before, session = self.session, BridgeSession(self.surroundings, configuration)
+        before = self.session
+        try:
+            session = BridgeSession(self.surroundings, configuration)
+        except Exception:
+            self._hold_ports(*before.configuration.held)
+            if not self.link.is_released:  # the PLCs were told of an end; begin with them again
+                for wanted in (False, True):
+                    self.set_polling(SetBool.Request(data=wanted), SetBool.Response())
+            raise
         self.session = session
         self.writes.give_to(session.writers)
         if not self.link.exchange(session.driver.machine, session.reads.publish_later_values,
