@@ -93,14 +93,26 @@ class GuestLine:
         return state.text if state.kind is PortKind.UNAVAILABLE else ''
 
     def start(self) -> None:
-        """Wait for the guest, and serve it."""
-        self.link.start()
+        """Wait for the guest, and serve it; also after ``pause``."""
+        if self.link.is_released:
+            self.link.take()
+        else:
+            self.link.start()
+
+    def pause(self) -> None:
+        """Close the place and disconnect the guest until the next ``start``."""
+        self.link.release()
+        self._close()
 
     def stop(self) -> None:
         """End the place."""
         self.link.stop()
-        if self._endpoint is not None:
-            self._endpoint.close()
+        self._close()
+
+    def _close(self) -> None:
+        endpoint, self._endpoint = self._endpoint, None
+        if endpoint is not None:
+            endpoint.close()
 
     def _run(self, machine: Machine) -> Procedure:
         return self._peer.run(_Nothing())

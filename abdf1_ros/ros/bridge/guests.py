@@ -40,7 +40,7 @@ class GuestPlaces(GuestListener):
         self._driver = driver
         self._opener = opener
         self._notes = notes
-        self._has_begun = False
+        self._are_open = False
         network = configuration.network
         if configuration.parameters.read_only:
             network = replace(network, share_access='Read')
@@ -49,10 +49,17 @@ class GuestPlaces(GuestListener):
 
     def start(self) -> None:
         """Let guests connect, unless the places are open already."""
-        if not self._has_begun:
-            self._has_begun = True
+        if not self._are_open:
+            self._are_open = True
             for line in self.lines:
                 line.start()
+
+    def pause(self) -> None:
+        """Close the places and disconnect the guests until the next ``start``."""
+        if self._are_open:
+            self._are_open = False
+            for line in self.lines:
+                line.pause()
 
     def stop(self) -> None:
         """Close the places and disconnect the guests."""

@@ -204,7 +204,8 @@ class BridgeSession:
         self.guests.start()
 
     def withdraw(self) -> None:
-        """Close the topics of the map: the bridge has lost the line."""
+        """Close the topics of the map, and the places of guests: the bridge has lost the line."""
+        self.guests.pause()
         self._surroundings.services.withdraw()
         self._surroundings.writes.withdraw()
         self.reads.withdraw()
