@@ -220,16 +220,21 @@ def test_line_of_a_device_server_is_ours_when_any_station_has_answered_since_it_
     assert around.link.wake.called  # the last commands do not wait for the next poll
 
 
-def test_change_that_waits_for_the_executor_is_not_begun_again() -> None:
-    tasks: list[object] = []
+def test_change_that_waits_for_the_executor_is_not_begun_again_before_it_ends() -> None:
+    tasks: list[Any] = []
     around: Any = SimpleNamespace(
         results=None, active_stations=None, snapshot=None, is_offered=True,
-        node=SimpleNamespace(executor=SimpleNamespace(create_task=tasks.append)))
-    session: Any = SimpleNamespace(has_line=False)
+        node=Mock(**{'executor.create_task': lambda *task: tasks.append(task)}))
+    session: Any = Mock(has_line=False, **{'withdraw.side_effect': KeyError})
     standby = Standby(around, lambda: session, [])
     for _ in range(2):
         standby.look()
-    assert tasks == [standby.leave_line]
+    (change, step), = tasks
+    with pytest.raises(KeyError):
+        change(step)
+    session.has_line = True
+    standby.look()
+    assert len(tasks) == 2
 
 
 def test_spare_in_the_queue_of_a_device_server_waits_and_keeps_its_line_over_a_reload(

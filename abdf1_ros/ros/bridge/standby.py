@@ -73,8 +73,15 @@ class Standby:
         if has_line is is_offered and not has_rest or self._is_changing or executor is None:
             return
         self._is_changing = True
-        executor.create_task(
-            self._take_line if has_line else self.leave_line if is_offered else self._close)
+        executor.create_task(self._change, (
+            self._take_line if has_line else self.leave_line if is_offered else self._close))
+
+    def _change(self, step: Callable[[], None]) -> None:
+        """Take a step; if it fails, the next look goes on from there."""
+        try:
+            step()
+        finally:
+            self._is_changing = False
 
     def _take_line(self) -> None:
         """Offer everything: the bridge has the line."""
@@ -82,7 +89,6 @@ class Standby:
             'has got the line: begins to publish and to accept writes')
         self.offer()
         self._session().offer()
-        self._is_changing = False
 
     def leave_line(self) -> None:
         """Withdraw all but the services that ``stays`` keeps: another bridge may have the line."""
@@ -99,4 +105,3 @@ class Standby:
         for service in [*self._made]:
             if not service.stays or not self._surroundings.link.is_released:
                 self._surroundings.node.destroy_service(self._made.pop(service))
-        self._is_changing = False
