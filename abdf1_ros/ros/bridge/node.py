@@ -231,7 +231,7 @@ class BridgeNode(AnsweringNode):
             session = BridgeSession(self.surroundings, configuration)
         except Exception:
             self._hold_ports(*before.configuration.held)
-            if not self.link.is_released:  # the PLCs were told of an end; begin with them again
+            if not self.link.is_released:  # after the end that the PLCs know, a start
                 for wanted in (False, True):
                     self.set_polling(SetBool.Request(data=wanted), SetBool.Response())
             raise
