@@ -70,7 +70,7 @@ from abdf1_ros.pccc.steps import AddressedValues
 from abdf1_ros.pccc.strings import is_string_element
 from abdf1_ros.pccc.values import ValueType, WordOrder
 from abdf1_ros.ports.settings import PortSettings
-from abdf1_ros.text import shown
+from abdf1_ros.text import first, shown
 
 if TYPE_CHECKING:
     from abdf1_ros.settings.mapping import Mapping as Row
@@ -207,9 +207,13 @@ class Client(OpenLine):
         from abdf1_ros.plan.planner import Planner  # not needed for single reads
         from abdf1_ros.plan.reading import read_planned
         number = self._of(station)
+        if isinstance(addresses, str) or not isinstance(addresses, Iterable):
+            raise FormatError(f'addresses {addresses!r} should be a list of addresses')
         rows = [self._row(text, item, number)
                 for item, text in enumerate(dict.fromkeys(addresses), 1)]
-        values = dict(read_planned(Planner(self.line_model, 1.0), [row for row, _ in rows], self))
+        with self.naming(_place(first([row.tag for row, _ in rows]), number)):
+            values = dict(read_planned(
+                Planner(self.line_model, 1.0), [row for row, _ in rows], self))
         return {row.tag: single(plain(values[row], row.type), is_one) for row, is_one in rows}
 
     def write(self, address: str, values: float | str | Sequence[float], kind: str | None = None,

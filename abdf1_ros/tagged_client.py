@@ -84,7 +84,8 @@ class TaggedClient(OpenLine):
         # They are read once, so their Periods must not keep them apart.
         rows = [replace(self._row(name, 'read', lambda row: row.polls), period=None)
                 for name in dict.fromkeys(tag)]
-        values = dict(read_planned(Planner(self.line_model, 1.0), rows, self))
+        with self.naming(first([row.tag for row in rows])):
+            values = dict(read_planned(Planner(self.line_model, 1.0), rows, self))
         return {row.tag: _shown(row, values[row]) for row in rows}
 
     def write(self, tag: str, values: float | str | Sequence[float]) -> None:

@@ -172,8 +172,10 @@ def test_many_addresses_are_read_by_the_plan(port: str, plcs: PlcPair) -> None:
         # What the PLC lacks is named, and does not take its neighbours along.
         with pytest.raises(RemoteError, match=r'^N7:250 \(N7:250 of station 1\): STS 50'):
             plc.read_many(['N7:248', 'N7:249', 'N7:250'])
-        with pytest.raises(FormatError, match='^N7:3-0 of station 1: the lower end comes first'):
-            plc.read_many(['N7:0', 'N7:3-0'])
+        for wrong, text in ((['N7:0', 'N7:3-0'], '^N7:3-0 of station 1: the lower end comes'),
+                            ('N7:0', "^addresses 'N7:0' should be a list of addresses")):
+            with pytest.raises(FormatError, match=text):
+                plc.read_many(wrong)
 
 
 def test_retries_trace_and_log_are_arguments(port: str, tmp_path: Path,

@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import Protocol, TypeVar
 
-from abdf1_ros.errors import Abdf1Error, RemoteError
+from abdf1_ros.errors import Abdf1Error, FormatError, RemoteError
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.dialect import Steps
 from abdf1_ros.pccc.processor import Processor
@@ -64,7 +64,12 @@ def read_planned(planner: Planner, mappings: Iterable[Mapping],
             waiting[:0] = parts
         else:
             for mapping in block.mappings:
-                yield mapping, mapping.codec.decode(data[block.slice_of(mapping)])
+                try:
+                    values = mapping.codec.decode(data[block.slice_of(mapping)])
+                except FormatError as error:
+                    error.about = f'{mapping.tag} ({mapping.address} of station {block.station})'
+                    raise
+                yield mapping, values
 
 
 def row_of(text: str, item: int, station: int, target: AddressedValues, access: Access | None,

@@ -46,7 +46,7 @@ class Scaling:
         """Return the nearest raw values; FormatError where they exceed the range of ``kind``."""
         low, high = kind.range
         found: list[float] = []
-        for index, value in enumerate(values):
+        for index, value in enumerate(map(_float_of, values)):
             nearest = (value - self.offset) / self.scale
             if kind is not ValueType.FLOAT32 and math.isfinite(nearest):
                 nearest = round(nearest)
@@ -88,3 +88,11 @@ class Scaling:
 def float32_step(value: float) -> float:
     """Return the distance of float32 numbers around ``value``."""
     return math.ldexp(1.0, max(math.frexp(value)[1] - 24, -149))
+
+
+def _float_of(value: float) -> float:
+    """Return a number as a float, infinite if no float can hold it."""
+    try:
+        return value * 1.0
+    except OverflowError:
+        return math.inf if value > 0 else -math.inf

@@ -18,18 +18,21 @@ from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 import math
+from unittest.mock import Mock
 
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.machine import LineTiming
 from abdf1_ros.df1.packet import Packet
+from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.server import Server
 from abdf1_ros.plan.line_model import LineModel
 from abdf1_ros.plan.partition import Candidate, cheapest, CostModel, partition, Span
 from abdf1_ros.plan.planner import Block, Planner
+from abdf1_ros.plan.reading import read_planned
 from abdf1_ros.settings.mapping import Mapping
 from hypothesis import given
 from hypothesis import strategies as st
@@ -215,6 +218,13 @@ def test_blocks_are_as_long_as_the_processor_takes_them(name: str, limit: int) -
         planner.processors[1] = told
     assert all(len(block.requests) == 1 and block.words <= 41 for block in planner.plan(words))
     assert spans(planner.plan([make_mapping('N7:0', length=110)])) == [('N7:0', 110)]  # a PLC-5
+
+
+def test_words_that_are_no_value_are_told_with_their_place() -> None:
+    level = make_mapping('N7:0', kind='bcd16', tag='level')
+    line = Mock(ask=Mock(return_value=b'\xCD\xAB'))
+    with pytest.raises(FormatError, match=r'^level \(N7:0 of station 1\): word ABCD is not BCD'):
+        list(read_planned(Planner(LINE, 0.1), [level], line))
 
 
 @pytest.mark.parametrize('plc', ['PLC5', 'SLC'])

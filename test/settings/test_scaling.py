@@ -79,7 +79,7 @@ def test_floats_are_not_rounded_to_whole_numbers() -> None:
     (ValueType.UINT32, Scaling(0.001, 0.0), math.inf,
      'value inf at index 1 is outside 0 to 4294967.295, the range of uint32 with Scale 0.001, '
      'Offset 0'),
-    (ValueType.INT32, Scaling(1.0, 0.0), -math.inf,
+    (ValueType.INT32, Scaling(1.0, 0.0), -10 ** 400,
      'value -inf at index 1 is outside -2147483648 to 2147483647, the range of int32 with '
      'Scale 1, Offset 0'),
     (ValueType.FLOAT32, Scaling(0.5, 0.0), 3e38,
