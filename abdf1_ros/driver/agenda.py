@@ -39,6 +39,7 @@ from __future__ import annotations
 
 from collections.abc import Container
 import math
+from operator import attrgetter
 
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.checks import Checks
@@ -50,6 +51,8 @@ from abdf1_ros.driver.writes.queue import WriteQueue
 from abdf1_ros.plan.bounds import OURS_BESIDE_GUESTS, OWN_IN_A_ROW
 
 MAX_WRITES_IN_A_ROW = 4
+
+_is_own = attrgetter('is_own')
 
 # On an unheard connection this many questions are sent without a pause, then one in
 # QUESTION_PERIOD seconds.
@@ -161,16 +164,17 @@ class Agenda:
             self._own_in_a_row = 0
             return job
         # Remaining packets of a long fallback go first: heartbeats that are always due would keep
-        # them waiting.
-        if under_way := self._tasks.first(busy, is_own=True):
+        # them waiting. Where the fallback stands, heartbeats count and must not wait for it.
+        if under_way := self._tasks.continued(now, busy, self._interlocks.is_urgent):
             self._own_in_a_row += 1
-            return self._tasks.take(under_way, now)
-        own = self._interlocks.next(now, busy, only_active=self._was_silent)
+            return under_way
+        own: Job | None = self._interlocks.next(now, busy, only_active=self._was_silent)
         if own is None and self._was_silent:  # after a try at a silent station
             self._was_silent = False
             if job := self._check_or_read(now, busy):
                 return job
             own = self._interlocks.next(now, busy)
+        own = own or self._tasks.continued(now, busy, self._interlocks.is_awaited)
         if own is None:
             return self._usual(now, busy)
         self._own_in_a_row += 1
@@ -238,6 +242,8 @@ class Agenda:
             self._writes_in_a_row += 1
         if write is not None or under_way is None:
             return write
+        if under_way.is_own:  # a fallback that stands takes turns with the reads
+            self._is_reads_turn, self._writes_in_a_row = True, MAX_WRITES_IN_A_ROW
         return self._tasks.take(under_way, now)
 
     def _check(self, now: float, busy: Container[int]) -> Job | None:
@@ -259,7 +265,8 @@ class Agenda:
 
     def _refresh(self, now: float, busy: Container[int]) -> Job | None:
         """Return a fallback to be written again (rule 8); a read has its turn after it."""
-        if self._is_reads_turn and self._reads.find_due(now):
+        if self._is_reads_turn and self._reads.find_due(now) \
+                or self._tasks.first((), _is_own):
             return None
         own = self._interlocks.refresh(now, busy)
         self._is_reads_turn |= own is not None

@@ -161,16 +161,23 @@ class JobTasks:
         """Begin a connection that has to be heard before anything is written."""
         self.is_heard = False
 
-    def first(self, busy: Container[int], is_own: bool = False) -> Job | None:
-        """Return the first waiting job, not for a ``busy`` station; ``is_own``: only own jobs."""
-        return next((job for job in self.waiting if job.station not in busy
-                     and (job.is_own or not is_own)), None)
+    def first(self, busy: Container[int],
+              is_meant: Callable[[Job], bool] = lambda job: True) -> Job | None:
+        """Return the first waiting job that ``is_meant``, not for a ``busy`` station."""
+        return next((job for job in self.waiting if job.station not in busy and is_meant(job)),
+                    None)
 
     def take(self, job: Job, now: float) -> Job:
         """Return a waiting job whose command is now to be sent."""
         self._stop_waiting(job)
         job.taken = now
         return job
+
+    def continued(self, now: float, busy: Container[int],
+                  is_meant: Callable[[Job], bool]) -> Job | None:
+        """Return the first waiting job that ``is_meant``: its next command is now to be sent."""
+        job = self.first(busy, is_meant)
+        return job and self.take(job, now)
 
     def expire(self, now: float) -> None:
         """End the jobs whose next command has waited too long."""

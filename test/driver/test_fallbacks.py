@@ -612,6 +612,21 @@ def test_rule_8_fallbacks_that_stand_and_reads_take_turns_on_a_full_line() -> No
     assert len(written) == pytest.approx(len(bench.listener.reads) - before, abs=5)
 
 
+def test_rule_8_packets_of_a_fallback_that_stands_wait_for_reads_until_a_message_waits() -> None:
+    lamps = make_mapping('B3:0/0', 'Write', plc='SLC', length=320,
+                         fallback=Fallback((0,) * 320, 2000))
+    bench = DriverBench([lamps, make_mapping('B3:99', plc='SLC', period=0)])
+    bench.plc(1, 'SLC', ('B3:0', 100))
+    row, = bench.driver.interlocks.fallbacks
+    for has_message, reads in (False, 18), (True, 2):
+        bench.run_until(lambda: row.stands and row.is_under_way)
+        count = len(bench.listener.reads)
+        if has_message:
+            bench.write(lamps, [1] * 320)
+        bench.run_until(lambda: not row.is_under_way)
+        assert len(bench.listener.reads) - count == reads
+
+
 @pytest.mark.parametrize(('outcome', 'next_refresh'), [
     (Outcome.WRITTEN, 12.0), (Outcome.UNKNOWN, 8.0), (Outcome.FAILED, 8.0)])
 def test_rule_10_refresh_is_not_the_second_write(outcome: Outcome, next_refresh: float) -> None:

@@ -31,6 +31,7 @@ from random import Random
 from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackRow, FallbackState
 from abdf1_ros.driver.interlocks.heartbeat import BeatState, HeartbeatRow, LARGEST
 from abdf1_ros.driver.interlocks.plc import Conditions, OwnRow, Plc, TurnRank
+from abdf1_ros.driver.job_tasks import Job
 from abdf1_ros.driver.reads.readings import ValueListener
 from abdf1_ros.driver.record import Claim, WriteListener
 from abdf1_ros.driver.served import Served
@@ -290,6 +291,16 @@ class Interlocks(WriteListener):
             if row is not None:
                 return WriteJob(row.refresh(now), self._writing, math.inf)
         return None
+
+    def is_urgent(self, job: Job) -> bool:
+        """Tell whether a job writes a fallback that does not stand: heartbeats wait for it."""
+        return isinstance(job, WriteJob) and job.is_own \
+            and not self._by_mapping[job.write.mapping].stands
+
+    def is_awaited(self, job: Job) -> bool:
+        """Tell whether a job writes a fallback, and a message waits for its end."""
+        return isinstance(job, WriteJob) and job.is_own \
+            and job.write.mapping in self._writes.youngest()
 
     def _own_ended(self, claim: Claim, write: Write, now: float) -> None:
         """Record how one of our own writes ended."""
