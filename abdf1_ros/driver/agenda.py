@@ -269,7 +269,10 @@ class Agenda:
                 or self._tasks.first((), _is_own):
             return None
         own = self._interlocks.refresh(now, busy)
-        self._is_reads_turn |= own is not None
+        if own is not None:
+            self._is_reads_turn = True
+            if not self._reads.find_due(now):  # then the turn of the writes begins again
+                self._writes_in_a_row = 0
         return own
 
     def _probe_from(self, now: float) -> float:

@@ -612,6 +612,16 @@ def test_rule_8_fallbacks_that_stand_and_reads_take_turns_on_a_full_line() -> No
     assert len(written) == pytest.approx(len(bench.listener.reads) - before, abs=5)
 
 
+def test_rule_8_messages_go_before_fallbacks_that_stand_where_nothing_is_read() -> None:
+    rows = [speed_row(Fallback((7,), 5000), f'N7:{number}', f'w{number}') for number in range(14)]
+    bench = DriverBench(rows, network=Network(baud=1200, timeout=300))
+    bench.plc(1, 'PLC5', ('N7:0', 14))
+    bench.run(12.0)
+    for _ in range(9):
+        bench.write(rows[0], [3], run=2.7)
+    assert bench.listener.outcomes()[14:] == [Outcome.WRITTEN] * 9
+
+
 def test_rule_8_packets_of_a_fallback_that_stands_wait_for_reads_until_a_message_waits() -> None:
     lamps = make_mapping('B3:0/0', 'Write', plc='SLC', length=320,
                          fallback=Fallback((0,) * 320, 2000))
