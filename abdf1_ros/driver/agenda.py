@@ -149,7 +149,9 @@ class Agenda:
         is_limited = self._questions >= _QUICK_QUESTIONS and now < self._next_question
         if is_limited:
             own = self._interlocks
-            return (own.next(now, busy) or own.refresh(now, busy)) if self._has_own else None
+            return self._has_own and (
+                self._tasks.continued(now, busy, _is_own)  # with all its packets
+                or own.next(now, busy) or own.refresh(now, busy)) or None
         job = self._own_first(now, busy) if self._has_own else self._usual(now, busy)
         if job is not None:
             self._questions += 1

@@ -127,6 +127,15 @@ def test_fallback_may_be_kept_as_it_is_the_value_of_rest(mode: str) -> None:
     assert {*bench.values_written()} == {SAFE}
 
 
+def test_packets_of_a_fallback_at_the_end_do_not_wait_for_questions() -> None:
+    lamps = make_mapping('B3:0/0', 'Write', plc='SLC', length=160,
+                         fallback=Fallback((SAFE,) * 160, 1000))
+    bench = Queue(rows=[lamps, make_mapping('N9:0', plc='SLC', period=200)])
+    bench.run(30.0)
+    bench.driver.interlocks.wind_down()
+    bench.run_until(lambda: bench.driver.interlocks.is_over, 2.0)
+
+
 def test_banner_noise_and_a_reply_to_another_client_are_not_heard() -> None:
     bench = Queue()
     other = bytes((9, 1, 0x4F, 0, 0x12, 0x34, 0, 0))
