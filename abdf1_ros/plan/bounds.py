@@ -36,6 +36,7 @@ from abdf1_ros.plan.planner import Block, Planner
 from abdf1_ros.settings.heartbeats import (
     HAND_OVER,
     LAST_ANSWER,
+    LEAST_REFRESH,
     LONGEST_END,
     READS_IN_TIME,
     STABLE,
@@ -346,10 +347,17 @@ def _packets(model: LineModel, mapping: Mapping) -> list[float]:
 def own_work(model: LineModel, mappings: Rows, default_period: float,
              stale_after: float = forecast.USUAL_STALE_AFTER,
              response_time: float = forecast.USUAL_RESPONSE_TIME) -> list[tuple[float, float]]:
-    """Return the seconds and the period (s) of each heartbeat and each question for a mode."""
+    """
+    Return the seconds and the period (s) of each command that goes between the reads.
+
+    These are heartbeats, questions for a mode, and fallbacks that stand and are written again.
+    """
     question = _question_time(model, response_time)
-    return [*((_with_answers(_packets(model, mapping), response_time), mapping.period / 1000)
-              for mapping in mappings.heartbeats if mapping.period),
+    periods = {mapping: mapping.period / 1000 for mapping in mappings.heartbeats if mapping.period}
+    periods |= {mapping: max(mapping.fallback.after / 1000, LEAST_REFRESH)
+                for mapping in mappings.fallbacks if mapping.fallback and not mapping.serves}
+    return [*((_with_answers([packet], response_time), period)
+              for mapping, period in periods.items() for packet in _packets(model, mapping)),
             *((question, period) for period in
               mode_periods(mappings, default_period, stale_after).values())]
 

@@ -22,7 +22,7 @@ full duplex it is the reply. PLCs serve the port once in a program scan.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from abdf1_ros.df1.mode import LineMode
 from abdf1_ros.plan.line_model import LineModel
@@ -88,7 +88,7 @@ def intervals(blocks: Iterable[Block], own: Iterable[tuple[float, float]] = (),
 
     That is the period, as far as the line allows. On a full line all periods become longer by the
     factor of the load, at most by a poll cycle, as in ``ReadQueue``. ``own`` holds the seconds and
-    the period of each heartbeat and each question for a mode: these go between the reads.
+    the period of each command that goes between the reads: see ``bounds.own_work``.
     """
     blocks, own = list(blocks), list(own)
     once = poll_cycle(blocks, response_time)
@@ -109,20 +109,27 @@ def longest_wait(blocks: Iterable[Block], response_time: float = USUAL_RESPONSE_
 
 
 def stale_times(blocks: Iterable[Block], default_period: float, stale_after: float,
-                own: Iterable[tuple[float, float]] = (), *,
+                own: Sequence[tuple[float, float]] = (), *,
                 is_heard: bool = False) -> dict[Mapping, float]:
     """
     Return after how many seconds a value of each mapping that is read counts as lost.
 
     Topics promise this time: ``stale_after`` times the expected interval, plus the longest wait
-    for the line. ``default_period`` is in seconds; ``own`` is described at ``intervals``. With
-    ``is_heard`` another master reads the words, at least once in a Period. Then Period takes the
-    place of the interval, and there is no wait.
+    for the line. Where many commands of ``own`` are due together, one may go after each read: then
+    it is at least the interval and the time of these. ``default_period`` is in seconds; ``own`` is
+    described at ``intervals``. With ``is_heard`` another master reads the words, at least once in
+    a Period. Then Period takes the place of the interval, and there is no wait.
     """
-    blocks = list(blocks)
+    blocks, times = list(blocks), [seconds for seconds, _ in own]
     expected, wait = ({}, 0.0) if is_heard else (intervals(blocks, own), longest_wait(blocks))
-    return {mapping: stale_after * max(period_of(mapping, default_period),
-                                       expected.get(block.period, 0.0)) + wait
+    reads = sum(len(block.requests) for block in blocks)
+    between = 0.0 if is_heard else min(sum(times), reads * max(times, default=0.0))
+
+    def stale_time(interval: float) -> float:
+        return max(stale_after * interval, interval + between) + wait
+
+    return {mapping: stale_time(max(period_of(mapping, default_period),
+                                    expected.get(block.period, 0.0)))
             for block in blocks for mapping in block.mappings if mapping.polls}
 
 

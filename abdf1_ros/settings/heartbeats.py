@@ -59,6 +59,9 @@ Longest time (s) of an orderly end if the process goes on.
 It is short, because a caller of ~/polling or ~/reload waits.
 """
 
+LEAST_REFRESH = 5.0
+"""Least time (s) after which a confirmed fallback value is written again (rule 8)."""
+
 _COUNTING = (ValueType.INT16, ValueType.UINT16)
 
 

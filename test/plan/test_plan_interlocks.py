@@ -355,13 +355,15 @@ def test_rule_14_timeout_is_three_planned_intervals() -> None:
             f'line; {enough} ms would be enough')
 
 
-def test_heartbeats_and_questions_for_run_are_counted_in_the_load() -> None:
+def test_heartbeats_fallbacks_and_questions_for_run_are_counted_in_the_load() -> None:
     plain = make_mapping('N7:0', period=1000)
     guarded = make_mapping('N7:0', period=1000, condition=While(('RUN',)))
     model = line_model(QUICK)
     assert own_work(model, Rows([plain]), 0.1) == []
     (seconds, period), (_, asked) = own_work(model, Rows([beat(100)]), 0.1)
     assert (seconds, period, asked) == (pytest.approx(write_time(QUICK, beat())), 0.1, MODE_PERIOD)
+    assert [period for after in (3000, 9000) for _, period in own_work(
+        model, Rows([speed(after), speed(after, 'Serve')]), 0.1)] == [5.0, 2.0, 9.0, 2.0]
     (question, asked), = own_work(model, Rows([guarded]), 0.1)
     assert (0.02 < question < 0.1, asked) == (True, 1.0)
     assert make_report(QUICK, [guarded], 0.1).load > make_report(QUICK, [plain], 0.1).load

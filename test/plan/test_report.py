@@ -16,7 +16,15 @@
 
 from dataclasses import replace
 
-from abdf1_ros.plan.forecast import block_time, intervals, line_model, load, PATIENCE, poll_cycle
+from abdf1_ros.plan.forecast import (
+    block_time,
+    intervals,
+    line_model,
+    load,
+    PATIENCE,
+    poll_cycle,
+    stale_times,
+)
 from abdf1_ros.plan.planner import Planner
 from abdf1_ros.plan.report import make_report, Remark, RemarkKind, Report, setting_remarks
 from abdf1_ros.settings.heartbeats import Fallback, While
@@ -445,6 +453,14 @@ def test_periods_are_longer_by_the_load_of_the_line_but_by_no_more_than_a_scan()
     assert found[1.0] == pytest.approx(1.0 + 11 * time, rel=0.01)
     found, time = expected((1000, 1), own=((0.5, 0.1),))
     assert found == {1.0: pytest.approx(1.0 + time + 0.5)}
+
+
+@for_all(('count', 'between'), [(0, 0.5), (1, 0.6), (2, 1.2), (9, 1.2)])
+def test_stale_time_has_room_for_one_own_command_after_each_read(
+        count: int, between: float) -> None:
+    blocks = Planner(line_model(NETWORK), 0.25).plan([make_mapping('N7:0'), make_mapping('N9:0')])
+    found = stale_times(blocks, 0.25, 3.0, [(0.6, 100.0)] * count)
+    assert [*found.values()] == 2 * [pytest.approx(0.25 + between + block_time(blocks[0]))]
 
 
 def test_reads_without_a_period_are_expected_to_have_what_is_left() -> None:

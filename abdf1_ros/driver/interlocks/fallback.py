@@ -25,12 +25,10 @@ import math
 
 from abdf1_ros.driver.record import Claim, OwnWords
 from abdf1_ros.driver.write import Outcome, Write
+from abdf1_ros.settings.heartbeats import LEAST_REFRESH
 
 # Seconds after which a refused fallback value is written again.
 _PAUSE_AFTER_REFUSAL = 1.0
-
-# Least time (s) after which a confirmed fallback value is written again (rule 8).
-_LEAST_REFRESH = 5.0
 
 
 class FallbackCause(Enum):
@@ -198,7 +196,7 @@ class FallbackRow:
             self.refresh_at = now + _PAUSE_AFTER_REFUSAL
             self.words.try_again(self.refresh_at, now)
             return None
-        self.refresh_at = now + max(self.after, _LEAST_REFRESH)
+        self.refresh_at = now + max(self.after, LEAST_REFRESH)
         self.words.plan_again(self.tried)
         if self.cause is not None and self.tried < self._due_since:
             return None
