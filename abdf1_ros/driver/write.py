@@ -143,13 +143,6 @@ class Write:
             self.commands = write_requests(
                 self.mapping.address, self.mapping.codec, self.raw, dialect)
 
-    @property
-    def may_rewrite(self) -> bool:
-        """Tell whether parts of words may be changed by rewriting them after a refusal."""
-        processor = self.mapping.processor
-        return self.mapping.type.is_part and processor is not None \
-            and processor.may_lack_masked_write
-
     def bit_change(self, packet: int) -> tuple[Address, int, int]:
         """Return word, mask and bits of a packet that changes bits."""
         assert not isinstance(self.raw, str)

@@ -28,6 +28,8 @@ from functools import cached_property
 import math
 
 from abdf1_ros.df1.frames import Duplex, MAX_LINK_DATA, stuff
+from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.dialect import Transfer
 from abdf1_ros.pccc.steps import write_requests
 from abdf1_ros.pccc.values import ValueType
 from abdf1_ros.plan import forecast
@@ -79,6 +81,8 @@ _SHORT_PERIOD = 200
 
 # Another setting is advised if it reduces the longest bound to less than this part.
 _WORTH_IT = 0.9
+
+_LONGEST_WORD = b'\x10\x10'  # the line sends each of these bytes twice
 
 _STATUS_BYTES = 1, 26  # of the command after TNS, and of the longest usual reply
 
@@ -340,8 +344,15 @@ def _packets(model: LineModel, mapping: Mapping) -> list[float]:
     """Return the line time (s) of each transaction of a write of a row: of its Fallback, or 0."""
     zeros = '' if mapping.type is ValueType.STRING else [0] * mapping.length
     values = raw_values(mapping, mapping.fallback.values) if mapping.fallback else zeros
-    return [model.transaction_time(len(stuff(body)), 0) for _, body in write_requests(
-        mapping.address, mapping.codec, values, mapping.dialect)]
+    dialect, codec = mapping.dialect, mapping.codec
+    requests = write_requests(mapping.address, codec, values, dialect)
+    rewritten: list[Address] = []
+    if mapping.may_rewrite and not isinstance(values, str):
+        # After the refusal each word is read and written back, with bits that nobody knows here.
+        rewritten += (word for word, _, _ in codec.bit_changes(mapping.address, values))
+        requests += (dialect.write(word, _LONGEST_WORD) for word in rewritten)
+    return [*(model.transaction_time(len(stuff(body)), 0) for _, body in requests),
+            *(model.read_time(dialect, Transfer(word, 1)) for word in rewritten)]
 
 
 def own_work(model: LineModel, mappings: Rows, default_period: float,

@@ -197,6 +197,12 @@ class Mapping:
         return self.writes or self.is_heartbeat
 
     @property
+    def may_rewrite(self) -> bool:
+        """Tell whether parts of words may be changed by rewriting them after a refusal."""
+        return self.type.is_part and self.processor is not None \
+            and self.processor.may_lack_masked_write
+
+    @property
     def is_alone(self) -> bool:
         """Tell whether no other row may write the words (rules 1 and 12)."""
         return self.is_heartbeat or self.fallback is not None

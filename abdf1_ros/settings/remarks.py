@@ -114,8 +114,7 @@ def row_remarks(row: Row, mapping: Mapping) -> Iterator[Problem]:
     is_member = address.file_type.is_structure and address.bit is None
     if address.file_type in _WRITTEN and not mapping.serves and not is_member:
         yield _at(row, 'Command', f'{address} {_WRITTEN[address.file_type]}')
-    if mapping.fallback is not None and mapping.type.is_part \
-            and mapping.processor is not None and mapping.processor.may_lack_masked_write:
+    if mapping.fallback is not None and mapping.processor and mapping.may_rewrite:
         yield _at(row, 'Fallback', f'{mapping.processor.value} may change bits by rewriting the '
                                    'whole word: what its program changes meanwhile is lost')
     low, high = mapping.limits

@@ -118,6 +118,17 @@ def test_rule_16_counts_doubled_bytes_of_a_fallback(
     assert other - plain == pytest.approx(3 * doubled * 10 / 19200)
 
 
+def test_rule_16_counts_that_words_of_bits_may_be_read_and_written_back() -> None:
+    masked, rewritten = (next(Times(QUICK, Rows([make_mapping(
+        'B3:0/0', 'Write', plc='SLC', processor=processor, length=32,
+        fallback=Fallback((0,) * 32, 500))])).bounds()).usual or 0.0
+        for processor in ('5/03', 'ML1000'))
+    word = make_mapping('B3:0', 'ReadWrite', plc='SLC')
+    read = Planner(line_model(QUICK), 0.1).alone(word).line_time + 0.02
+    back = write_time(QUICK, word) + 2 * 10 / 19200  # both bytes may be 10 hex
+    assert rewritten - masked == pytest.approx(2 * (read + back))
+
+
 def test_rule_16_longest_packet_of_any_read_counts_also_of_one_on_demand() -> None:
     """And the remarks on the times count the same transactions."""
     slow = Network(baud=1200, timeout=300)

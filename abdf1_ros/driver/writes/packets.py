@@ -72,7 +72,7 @@ def _send(write: Write, packet: int) -> Steps[str]:
     try:
         data_of((yield write.commands[packet]), write.mapping.address)
     except RemoteError as error:
-        if error.sts != STS_ILLEGAL_COMMAND or not write.may_rewrite:
+        if error.sts != STS_ILLEGAL_COMMAND or not write.mapping.may_rewrite:
             raise
         yield from _rewrite(write, packet, error)
         return REWRITTEN
