@@ -74,7 +74,7 @@ OURS_BESIDE_GUESTS = 3
 CARRIED_WITHIN = 1.0
 
 # Default of the parameter write_timeout (s), which is not in the files.
-_PATIENCE = 2.0
+USUAL_WRITE_TIMEOUT = 2.0
 
 # A heartbeat with a shorter Period (ms) may count faster than the PLC scans.
 _SHORT_PERIOD = 200
@@ -325,7 +325,7 @@ def _late_states(network: Network, mappings: Rows, response_time: float) -> Iter
     a_write_each = sum(_with_answers(_packets(model, mapping), response_time) for mapping in rows)
     for mapping in rows:
         after = mapping.fallback.after / 1000 if mapping.fallback else math.inf
-        patience = min(_PATIENCE, after)
+        patience = min(USUAL_WRITE_TIMEOUT, after)
         if min(CARRIED_WITHIN, patience / 2) + a_write_each > patience:
             yield (f'{mapping.tag}: if programs publish all write topics faster than the line '
                    'can carry, a message waits for a write of each, '

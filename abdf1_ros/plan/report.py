@@ -406,8 +406,9 @@ def _again_remarks(report: Report) -> Iterator[Remark]:
             continue
         reads = [expected[block.period] for block in report.blocks
                  if block.extent.holds(row.extent)]
-        least = min(row.write_again, row.fallback.after if row.fallback else math.inf)
-        which = 'Fallback_After' if least < row.write_again else 'Write_Again'
+        least, which = min((row.write_again, 'Write_Again'), (
+            (row.fallback.after, 'Fallback_After') if row.fallback
+            else (int(1000 * bounds.USUAL_WRITE_TIMEOUT), 'write_timeout')))
         if not reads:
             text = 'has no effect: no Read row has all of its words'
         elif 2000 * min(reads) > least:

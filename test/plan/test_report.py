@@ -382,6 +382,7 @@ def test_write_again_is_held_against_the_reads_that_slow_plcs_allow() -> None:
     (1000, None, 500, ''), (1000, None, 800, 'read every 800 ms, and that has to be well below '
                                              'Write_Again, 1000 ms'),
     (5000, 1000, 800, 'read every 800 ms, and that has to be well below Fallback_After, 1000 ms'),
+    (5000, None, 1500, 'read every 1500 ms, and that has to be well below write_timeout, 2000 ms'),
     (1000, None, None, 'w: Write_Again has no effect: no Read row has all of its words')])
 def test_words_with_write_again_have_to_be_read_often(
         again: int, after: int | None, period: int | None, expected: str) -> None:
