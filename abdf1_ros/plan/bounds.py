@@ -291,16 +291,21 @@ def remarks(network: Network, mappings: Rows, blocks: Sequence[Block],
     """Yield remarks on the times of heartbeats and fallbacks (rules 2 and 16)."""
     times = Times(network, mappings, blocks, response_time)
     longest, end = times.longest, times.end or 0.0
+    silent = times.end_in_silence or 0.0
     if end > LONGEST_END:
         yield (f'an orderly end needs {milliseconds(end)} and has {milliseconds(LONGEST_END)}: '
                'the last rows keep their values. Use fewer rows, a higher Baud or several lines')
     elif end > HAND_OVER:
         yield (f'an orderly end needs {milliseconds(end)}; ~/polling has '
                f'{milliseconds(HAND_OVER)}, and the last rows keep their values')
-    if end <= LONGEST_END < (silent := times.end_in_silence or 0.0):
+    if end <= LONGEST_END < silent:
         yield (f'an orderly end where no PLC answers needs {milliseconds(silent)} and has '
                f'{milliseconds(LONGEST_END)}: the bridge does not try the last rows; shorten '
                'Timeout or Cmd_Timeout, or use fewer rows')
+    elif end <= HAND_OVER < silent <= LONGEST_END:
+        yield (f'an orderly end where no PLC answers needs {milliseconds(silent)}; ~/polling and '
+               f'~/reload have {milliseconds(HAND_OVER)}, and the bridge does not try the last '
+               'rows')
     for mapping in mappings:
         if mapping.is_heartbeat and mapping.period is not None:
             if longest > mapping.period / 1000:

@@ -323,12 +323,15 @@ def test_rules_5_and_16_end_where_no_plc_answers_has_the_time_that_is_printed(
     assert [heard.count(body) for body in tries] == [stations] * len(tries)
 
 
-def test_rule_5_end_that_is_too_long_where_no_plc_answers_is_warned_of() -> None:
-    many = [warning for warning in remarks(replace(QUICK, mode='Radio'), Rows(plant(2, 5)), ())
-            if 'where no PLC answers' in warning]
-    assert ['does not try the last rows' in warning for warning in many] == [True]
-    assert not [warning for warning in remarks(QUICK, Rows(plant(2, 5)), ())
-                if 'answers' in warning]
+@for_all(('mode', 'rows', 'text'), [
+    ('Radio', 5, 'and has 6000 ms: the bridge does not try the last rows'),
+    ('Master', 10, '~/reload have 2000 ms, and the bridge does not try the last rows'),
+    ('Master', 5, '')])
+def test_rule_5_end_that_is_too_long_where_no_plc_answers_is_warned_of(
+        mode: str, rows: int, text: str) -> None:
+    found = [warning for warning in remarks(replace(QUICK, mode=mode), Rows(plant(2, rows)), ())
+             if 'where no PLC answers' in warning]
+    assert [text in warning for warning in found] == [True] * bool(text)
 
 
 @pytest.mark.parametrize(('stations', 'rows', 'text'), [
