@@ -167,15 +167,15 @@ class Agenda:
             return job
         # Remaining packets of a long fallback go first: heartbeats that are always due would keep
         # them waiting. Where the fallback stands, heartbeats count and must not wait for it.
-        if under_way := self._tasks.continued(now, busy, self._interlocks.is_urgent):
-            self._own_in_a_row += 1
-            return under_way
-        own: Job | None = self._interlocks.next(now, busy, only_active=self._was_silent)
-        if own is None and self._was_silent:  # after a try at a silent station
+        # A packet to a silent station takes a whole Timeout: a write to a living one goes between.
+        own: Job | None = self._was_silent and self._interlocks.next(
+            now, busy, only_active=True) or None
+        own = own or self._tasks.continued(now, busy, self._interlocks.is_urgent)
+        if own is None and self._was_silent:  # after all packets of a try at a silent station
             self._was_silent = False
             if job := self._check_or_read(now, busy):
                 return job
-            own = self._interlocks.next(now, busy)
+        own = own or self._interlocks.next(now, busy)
         own = own or self._tasks.continued(now, busy, self._interlocks.is_awaited)
         if own is None:
             return self._usual(now, busy)

@@ -716,6 +716,17 @@ def test_rule_11_first_tries_at_a_silent_plc_and_reads_take_turns_on_a_full_line
     assert any(first < when <= second for when in line.listener.times(read))
 
 
+def test_rule_11_heartbeat_of_a_living_plc_goes_between_packets_for_a_silent_one() -> None:
+    lamps = make_mapping('N7:0/0', 'Write', length=320, fallback=Fallback((0,) * 320, 2000))
+    line = Line([lamps, make_mapping('N7:30', 'Heartbeat', station=2, period=200)], (1, 2))
+    line.run(1.0)
+    line.write(lamps, [1] * 320, run=1.0)
+    line.far_stations[0].faults.silent = True
+    line.run(6.0)
+    beats = [when for when, _, word in line.asked if word == 30]
+    assert max(map(float.__sub__, beats[1:], beats)) < 0.7
+
+
 def test_rule_11_flood_of_bits_does_not_delay_beats_nor_starve_reads() -> None:
     bit, read = make_mapping('B3:0/0', 'Write'), make_mapping('N11:0', period=100)
     cell = Cell(beat_row(period=200), bit, read, run=1.0)
