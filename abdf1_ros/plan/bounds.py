@@ -353,7 +353,7 @@ def _packets(model: LineModel, mapping: Mapping) -> list[float]:
     requests = write_requests(mapping.address, codec, values, dialect)
     rewritten: list[Address] = []
     if mapping.may_rewrite and not isinstance(values, str):
-        # After the refusal each word is read and written back, with bits that nobody knows here.
+        # After the refusal each word is read and written back; what is in it is not known here.
         rewritten += (word for word, _, _ in codec.bit_changes(mapping.address, values))
         requests += (dialect.write(word, _LONGEST_WORD) for word in rewritten)
     return [*(model.transaction_time(len(stuff(body)), 0) for _, body in requests),

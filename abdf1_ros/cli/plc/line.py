@@ -51,7 +51,7 @@ def apart_from_target(network: Network, options: argparse.Namespace,
     """
     Return a line on which we have another address than the station that the options name.
 
-    If ours has to change, it becomes none of ``others`` either, and not that of the gateway.
+    A new address is none of ``others``, and not that of the gateway.
     Raises ConfigurationError if a user gave us the address of that station.
     """
     if options.station != network.station:
