@@ -280,10 +280,14 @@ class Driver:
         self._listener.station_changed(station)
 
     def _station_of_guest(self, dst: int) -> int:
-        """Return the station that a guest means; in Mode Peer the one PLC, whatever the DST."""
-        if not self.network.line_mode.has_one_plc:
-            return dst
-        return next((station.number for station in self.stations), dst)
+        """
+        Return the station that a guest means.
+
+        In Mode Peer this is the one PLC, whatever the DST. If there are several stations, a
+        gateway answers for them, and the DST decides.
+        """
+        numbers = [station.number for station in self.stations]
+        return numbers[0] if self.network.line_mode.has_one_plc and len(numbers) == 1 else dst
 
     def _words_of_guest(self, command: Packet, station: int) -> list[Extent] | None:
         # A PLC-5 has separate words for each station number that sends it PLC-2 writes. On the

@@ -76,6 +76,15 @@ def test_reply_of_the_plc_comes_back_with_the_numbers_of_the_guest(mode: str, ds
     assert 0.0 < program.guest.slowest < 0.3
 
 
+@pytest.mark.parametrize(('stations', 'meant'), [((1,), 1), ((1, 3), 2), ((1, 2), 2)])
+def test_only_a_peer_with_one_plc_takes_any_dst(stations: tuple[int, ...], meant: int) -> None:
+    rows = [make_mapping('N7:0', station=station) for station in stations]
+    guests = DriverBench(rows, network=Network(mode='Peer')).driver.guests
+    guests.put(GuestCommand(Guest('hmi'), Packet(2, 9, 0x0F, 0, 1, READ_N7), 0.0, print))
+    job = guests.next(0.0, ())
+    assert job is not None and job.station == meant
+
+
 def test_guest_waits_on_an_idle_line_no_longer_than_its_last_failure_asks_for() -> None:
     bench = DriverBench(
         [make_mapping('N7:0', station=station, plc='SLC', period=20_000) for station in (1, 2)],
