@@ -139,6 +139,10 @@ class Agenda:
             return job
         return job.start(self._tasks, now)
 
+    def port_lost(self, now: float) -> None:
+        """Count the time of the jobs that end with the port: ``next`` is called much later."""
+        self._share.settle(now)
+
     def _unheard(self, now: float, busy: Container[int]) -> Job | None:
         """
         Return the next job on a connection that has not been heard.

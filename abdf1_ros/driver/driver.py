@@ -370,6 +370,7 @@ class Driver:
         self.is_online = False
         self._standing.forget()
         self.tasks.fail(error)
+        self._agenda.port_lost(self.machine.now)
         self.guests.end()
         self.checks.end(str(error))
         self.readings.port_lost(str(error))

@@ -410,6 +410,7 @@ def test_lost_port_is_told_and_what_waits_is_not_sent_later() -> None:
     program = Program(bench)
     program.ask(READ_N7)
     program.ask(READ_N7)
+    bench.run_until(lambda: len(program.guest.waiting) == 1)
     fresh: list[Packet] = []
     bench.driver.guests.put(GuestCommand(
         program.guest, Packet(1, 9, 0x0F, 0, 1, READ_N7), bench.clock(), fresh.append))
@@ -420,8 +421,12 @@ def test_lost_port_is_told_and_what_waits_is_not_sent_later() -> None:
         each.ask(READ_N7)
     assert (len(program.replies), early.statuses) == (3, [0x04])
     assert set(program.statuses) <= {0x04, 0x05}
+    bench.run(3600.0)  # the outage is no time that the guest has had
     bench.open(run=2.0)
     assert len(program.replies) == 3
+    program.ask(READ_N7)
+    bench.run(1.0)
+    assert program.statuses[3:] == [0x00]
 
 
 def test_message_of_a_peer_to_the_number_of_a_guest_is_one_to_us() -> None:
