@@ -154,7 +154,8 @@ class Driver:
             Rows() if settings.read_only else self.mappings, self._writes, writing, self.served,
             self._listener, self._foreign_value, settings.first_tns)
         self.guests = GuestQueue(self.stations, machine, network.cmd_timeout / 1000,
-                                 self._station_of_guest, self._words_of_guest, record)
+                                 self._station_of_guest, self._words_of_guest, record,
+                                 self._fell_silent)
         compares = (self.interlocks,) if self.interlocks.heartbeats else ()
         repeated = [row for row in self.mappings if row.write_again]
         self._standing = Standing(repeated, settings.write_timeout)
@@ -275,9 +276,13 @@ class Driver:
         else:
             self.checks.went_away(station.number)
             self.readings.station_lost(station.number)
-            if not any(other.active for other in self.stations):
-                self._connect()
+            self._fell_silent()
         self._listener.station_changed(station)
+
+    def _fell_silent(self) -> None:
+        """Treat the connection as unheard again if no station of our rows answers (rule 26)."""
+        if not any(station.active for station in self.stations):
+            self._connect()
 
     def _station_of_guest(self, dst: int) -> int:
         """

@@ -152,19 +152,22 @@ class GuestQueue:
 
     ``put`` may be called from any thread. A command that has waited ``patience`` s is not sent any
     more. ``station_of`` returns the station for a DST, ``words`` the words that a command writes,
-    if known. Each command that may write is in the ``record``.
+    if known. Each command that may write is in the ``record``. ``fell_silent`` is called when a
+    station that only guests ask has become silent.
     """
 
     def __init__(self, stations: ActiveStationList, line: LineTime, patience: float,
                  station_of: Callable[[int], int],
                  words: Callable[[Packet, int], list[Extent] | None],
-                 record: WriteRecord) -> None:
+                 record: WriteRecord,
+                 fell_silent: Callable[[], None] = lambda: None) -> None:
         self._stations = stations
         self.line = line
         self._patience = patience
         self._station_of = station_of
         self._words = words
         self._record = record
+        self._fell_silent = fell_silent
         self.inbox: Inbox[GuestCommand] = Inbox(is_open=False)  # commands not sorted yet
         self.waiting: deque[Guest] = deque()  # guests with commands, the next one first
         self.next_expiry = math.inf  # when ``expire`` has work (clock value in s)
@@ -263,7 +266,11 @@ class GuestQueue:
     def _silent(self, station: int, now: float) -> None:
         """Treat a station that only guests ask as silent: no other command shows its silence."""
         if station not in self._stations and station != BROADCAST:
+            record = self._stations[station]
+            was_heard = record.active and record.last_heard is not None
             self._stations.lost(station, now)
+            if was_heard:
+                self._fell_silent()
 
     def _look(self) -> None:
         """Find out when the first command has waited too long."""

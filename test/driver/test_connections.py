@@ -175,8 +175,9 @@ def test_line_that_only_broadcasts_is_spared() -> None:
     assert bench.listener.outcomes() == [Outcome.BROADCAST]
 
 
-def test_read_of_a_guest_is_the_question_where_there_are_no_rows_no_write() -> None:
-    bench = Queue(rows=[], share='tcp:6000', is_open=True)
+@pytest.mark.parametrize('mode', ['Master', 'Peer'])
+def test_read_of_a_guest_is_the_question_where_there_are_no_rows_no_write(mode: str) -> None:
+    bench = Queue(mode, [], share='tcp:6000', is_open=True)
     guest, answers = Guest('tcp:6000', ShareAccess.ALL), list[Packet]()
 
     def ask(tns: int, data: bytes) -> None:
@@ -188,5 +189,11 @@ def test_read_of_a_guest_is_the_question_where_there_are_no_rows_no_write() -> N
     write, read = b'\xAA\x02\x07\x89\0\0\x05\0', b'\xA2\x02\x07\x89\0\0'
     for tns, data in enumerate((write, read, write)):
         ask(tns, data)
-    assert [reply.sts for reply in answers] == [0x07, 0, 0]
-    assert bench.values_written() == [5]
+    bench.device.hear = bench.keep
+    for tns in range(3, 7):
+        ask(tns, write)
+    bench.let_through()
+    for tns, data in enumerate((write, read, write), 7):
+        ask(tns, data)
+    assert [reply.sts for reply in answers] == [7, 0, 0, 2, 7, 7, 7, 7, 0, 0]
+    assert bench.values_written() == [5, 5, 5]  # one was kept
