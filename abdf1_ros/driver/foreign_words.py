@@ -49,7 +49,7 @@ class _NotedTable(DataTable):
     The files of some rows, each of unlimited size; writes are noted, and their data dropped.
 
     ``is_elsewhere`` tells that a command named a file of no row. Such a file has the type
-    ``others``; with None there is no such file.
+    ``others``; with None there is no such file. ``files`` are all files that were written.
     """
 
     def __init__(self, plc_type: PlcType, rows: Sequence[Mapping],
@@ -59,6 +59,7 @@ class _NotedTable(DataTable):
         self._types = {row.address.file: row.address.file_type for row in rows
                        if not row.address.is_by_type}
         self.written: list[tuple[Address, int]] = []
+        self.files: set[int] = set()
         self.is_elsewhere = False
 
     def file_type(self, file: int) -> FileType:
@@ -74,6 +75,7 @@ class _NotedTable(DataTable):
 
     def write(self, address: Address, data: bytes) -> None:
         """Note which words of files of rows are written."""
+        self.files.add(address.file)
         if address.is_by_type or address.file in self._types:
             self.written.append((address, len(data) // 2))
 
@@ -101,26 +103,30 @@ def written_extents(command: Packet, station: int,
     """
     Return the words of the files of ``mappings`` that a command to a station writes.
 
-    The result is None if the command may write any words. A server of the family executes the
-    command, because the address of a PLC-5 does not tell the type of its file. A command to all
-    stations writes the words of each station.
+    The result is None if no family of the rows knows the command: it may write any words. A server
+    of each family executes the command, because the address of a PLC-5 does not tell the type of
+    its file. A command to all stations writes the words of each station.
     """
     rows = [mapping for mapping in mappings.of_plcs
             if station in (mapping.station, BROADCAST)]
     found: list[Extent] = []
+    is_known = not rows
     for number, plc_type in {(row.station, row.plc_type): None for row in rows}:
         there = [row for row in rows if row.station == number]
         if _uses_common_file(command, there):
             found += [row.extent for row in there if _may_be_common(row)]
+            is_known = True
             continue
         # A command may name files with and without rows.
         table = _NotedTable(plc_type, there, FileType.INTEGER)
         reply = Server(table).serve(command)
-        if reply.sts and not table.is_elsewhere:
-            return None
-        found += [Extent(number, address.area, address.offset, address.offset + words)
-                  for address, words in table.written]
-    return found
+        if not reply.sts or table.is_elsewhere:
+            found += [Extent(number, address.area, address.offset, address.offset + words)
+                      for address, words in table.written]
+            if table.files & CIF_FILES:
+                found += [row.extent for row in there if row.access is Access.CIF]
+            is_known = True
+    return found if is_known else None
 
 
 class _CodedTable(_NotedTable):

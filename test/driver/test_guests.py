@@ -210,6 +210,16 @@ def test_words_of_a_write_to_the_common_interface_file_are_all_of_the_file(text:
     assert found == [rows[0].extent]
 
 
+@pytest.mark.parametrize(('file', 'met'), [(7, (0, 2)), (9, (2,)), (10, (1,)), (11, ())])
+def test_words_of_a_write_beside_rows_of_that_file_are_known(
+        file: int, met: tuple[int, ...]) -> None:
+    rows = [make_mapping(address, plc='SLC') for address in ('N7:0', 'N10:0')]
+    rows.append(make_mapping('005', plc='PLC2', access='CIF'))  # a family without this command
+    data = WRITE_N7[:2] + bytes((file,)) + WRITE_N7[3:]
+    assert written_extents(Packet(1, 9, 0x0F, 0, 1, data), 1, Rows(rows)) == [
+        rows[row].extent for row in met]
+
+
 @pytest.mark.parametrize('text', ['0F 80 01', '0F 57 00', '0F'])
 def test_words_of_a_command_that_nobody_knows_may_be_any(text: str) -> None:
     data, rows = bytes.fromhex(text), [make_mapping('N7:0', plc='SLC')]
@@ -228,7 +238,7 @@ def test_words_of_a_plc2_write_to_a_plc5_are_in_the_file_of_our_number_not_the_g
 
 def test_words_of_a_broadcast_are_those_of_every_station() -> None:
     rows = [make_mapping('N7:0', plc='SLC', station=number) for number in (1, 2)]
-    rows.append(make_mapping('N7:0', 'Serve', plc='SLC', station=0))
+    rows += make_mapping('N7:0', 'Serve', plc='SLC', station=0), make_mapping(station=3)
     found = written_extents(Packet(255, 9, 0x0F, 0, 1, WRITE_N7), 255, Rows(rows))
     assert found == [row.extent for row in rows[:2]]
 
