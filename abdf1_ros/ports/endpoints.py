@@ -16,8 +16,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
+import fcntl
 from functools import partial
 import os
 from pathlib import Path
@@ -78,21 +79,32 @@ class PtyEndpoint:
     def __init__(self, link: str | None) -> None:
         self._link = Path(link) if link else None
         self._lock = _own(self._link) if self._link else None
+        self._ends: list[int] = []
+        try:
+            self._make()
+        except OSError:
+            if self._lock is not None:
+                self._lock.close()
+            raise
+        self.name = link or self._target
+
+    def _make(self) -> None:
+        """Make the pseudo-terminal and its name; close the one before it."""
         if self._link:
             # Done before we make a terminal, because it may get the number in an old link.
             _remove_left_over(self._link)
-        self._ours, theirs = os.openpty()
         # Both ends stay open. Otherwise a read fails while no client is connected.
-        self._ends = [self._ours, theirs]
-        tty.setraw(theirs)
-        self._target = os.ttyname(theirs)
-        self.name = link or self._target
-        if self._link:
-            try:
-                _make_link(self._link, self._target)
-            except OSError:
-                self.close()
-                raise
+        ends = [*os.openpty()]
+        tty.setraw(ends[1])
+        target = os.ttyname(ends[1])
+        try:
+            if self._link:
+                _make_link(self._link, target)
+        except OSError:
+            _close(ends)
+            raise
+        _close(self._ends)
+        self._ours, self._ends, self._target = ends[0], ends, target
 
     def open(self) -> Port:  # noqa: A003
         """Return our end."""
@@ -102,6 +114,7 @@ class PtyEndpoint:
     def drop_unread(self) -> None:
         """Drop the bytes that no program has read."""
         theirs = os.open(self._target, os.O_RDWR | os.O_NOCTTY)
+        fcntl.ioctl(theirs, termios.TIOCNXCL)  # we may be root, other programs may not
         termios.tcflush(theirs, termios.TCIFLUSH)
         os.close(theirs)
 
@@ -109,8 +122,7 @@ class PtyEndpoint:
         """Remove the pseudo-terminal and its name."""
         if self._link and _target_of(self._link) == self._target:
             self._link.unlink()
-        for end in self._ends:
-            os.close(end)
+        _close(self._ends)
         if self._lock is not None:
             self._lock.close()
 
@@ -120,11 +132,12 @@ class PtyPlace(PtyEndpoint):
     A pseudo-terminal for one program at a time.
 
     When a program ends, bytes that it has not read are dropped. So are bytes that it has written
-    shortly before its end.
+    shortly before its end. If it has kept the terminal for itself (TIOCEXCL), another terminal
+    takes the name.
     """
 
-    def __init__(self, link: str) -> None:
-        super().__init__(link)
+    def _make(self) -> None:
+        super()._make()
         os.close(self._ends.pop())  # so that our end shows when no program has opened the far end
         self._hangs_up = select.poll()
         self._hangs_up.register(self._ours, 0)
@@ -132,13 +145,18 @@ class PtyPlace(PtyEndpoint):
     def open(self) -> Port:  # noqa: A003
         """Return our end if a program has opened the far end; raise NoClient otherwise."""
         if self._hangs_up.poll(0):
-            self._forget()
+            try:
+                self._forget()
+            except OSError:
+                # The last program has set TIOCEXCL, which lasts as long as this terminal.
+                self._make()
             raise NoClient
         descriptor = os.dup(self._ours)
 
         def close() -> None:
-            self._forget()
             os.close(descriptor)
+            with suppress(OSError):  # left to ``open``
+                self._forget()
 
         return DescriptorPort(descriptor, close)
 
@@ -199,6 +217,11 @@ class _WirePort(DescriptorPort):
         with suppress(BlockingIOError):
             if not self.is_idle:
                 os.write(self._descriptor, data)
+
+
+def _close(ends: Iterable[int]) -> None:
+    for end in ends:
+        os.close(end)
 
 
 def _own(link: Path) -> socket.socket:

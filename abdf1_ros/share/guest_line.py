@@ -90,7 +90,8 @@ class GuestLine:
     def fault(self) -> str:
         """Return why no program can connect; empty if a program can."""
         state = self.link.state
-        return state.text if state.kind is PortKind.UNAVAILABLE else ''
+        is_shut = state.kind is PortKind.UNAVAILABLE or self.link.has_failed
+        return state.text if is_shut else ''
 
     def start(self) -> None:
         """Wait for the guest, and serve it; also after ``pause``."""

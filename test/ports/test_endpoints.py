@@ -15,6 +15,7 @@
 """Lines that are made or opened here: their names, who gets them, and what they leave behind."""
 
 from contextlib import closing, suppress
+from functools import partial
 import os
 from pathlib import Path
 import socket
@@ -82,6 +83,24 @@ def test_place_has_nothing_of_the_program_before(tmp_path: Path, wake: int) -> N
             with pytest.raises(NoClient):
                 line.open()
     assert not os.path.lexists(name)
+
+
+def test_place_that_a_program_keeps_for_itself_for_ever_is_made_again(
+        tmp_path: Path, wake: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    name = str(tmp_path / 'plc')
+    with closing(PtyPlace(name)) as line:
+        client, before = os.open(name, os.O_RDWR | os.O_NOCTTY), os.readlink(name)
+        with monkeypatch.context() as patch:  # TIOCEXCL, which does not keep out root
+            patch.setattr(line, 'drop_unread', partial(os.open, '/none', 0))
+            port = line.open()
+            os.close(client)
+            port.close()
+            with pytest.raises(NoClient):
+                line.open()
+        client = os.open(name, os.O_RDWR | os.O_NOCTTY)
+        with closing(line.open()) as port:
+            exchange(port, client, wake)
+        assert os.readlink(name) != before
 
 
 def test_wire_loses_what_no_program_takes(tmp_path: Path, wake: int) -> None:

@@ -308,6 +308,7 @@ def test_internal_error_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
         open=lambda: Waits((0.0, framed(1))), close=lambda: None))
     line.link.run()
     assert [*map(type, faults)] == 3 * [ZeroDivisionError]
+    assert line.fault.startswith('internal error: ZeroDivisionError')
 
 
 @for_all(('place', 'bits', 'baud'), [
