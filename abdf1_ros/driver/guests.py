@@ -201,15 +201,13 @@ class GuestQueue:
              may_write: bool = True) -> GuestJob | None:
         """Return the next command of the guests, in turns; without ``may_write`` only reads."""
         self._sort()
-        for guest in list(self.waiting):
-            station = self._station_of(guest.waiting[0].packet.dst)
-            if station in busy:
-                continue
+        while (guest := self._first(busy)) is not None:
             command = guest.waiting.popleft()
             self.waiting.remove(guest)
             if guest.waiting:
                 self.waiting.append(guest)
             self._look()
+            station = self._station_of(command.packet.dst)
             if self._stations[station].last_heard is None:
                 self._silent(station, now)  # maybe no such station: one poll or try at a time
             # A broadcast has no reply.
@@ -219,6 +217,11 @@ class GuestQueue:
                 return GuestJob(self, command, station, self._claim(command.packet, station))
             self._give_up(command, _OFF_LINE)
         return None
+
+    def _first(self, busy: Container[int]) -> Guest | None:
+        """Return the first guest whose next command is not for a ``busy`` station."""
+        return next((guest for guest in self.waiting
+                     if self._station_of(guest.waiting[0].packet.dst) not in busy), None)
 
     def _claim(self, packet: Packet, station: int) -> Claim | None:
         """Record a command that may write; a read needs no record."""

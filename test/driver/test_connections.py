@@ -180,20 +180,21 @@ def test_read_of_a_guest_is_the_question_where_there_are_no_rows_no_write(mode: 
     bench = Queue(mode, [], share='tcp:6000', is_open=True)
     guest, answers = Guest('tcp:6000', ShareAccess.ALL), list[Packet]()
 
-    def ask(tns: int, data: bytes) -> None:
-        bench.driver.guests.put(GuestCommand(
-            guest, Packet(1, 9, 0x0F, 0, tns, data), bench.clock(), answers.append))
+    def ask(*commands: bytes) -> None:
+        for data in commands:
+            bench.driver.guests.put(GuestCommand(
+                guest, Packet(1, 9, 0x0F, 0, 1, data), bench.clock(), answers.append))
         bench.line.wake(bench.driver.machine)
         bench.run(1.0)
 
     write, read = b'\xAA\x02\x07\x89\0\0\x05\0', b'\xA2\x02\x07\x89\0\0'
-    for tns, data in enumerate((write, read, write)):
-        ask(tns, data)
+    ask(write, write, read)
+    ask(write)
     bench.device.hear = bench.keep
-    for tns in range(3, 7):
-        ask(tns, write)
+    for _ in range(4):
+        ask(write)
     bench.let_through()
-    for tns, data in enumerate((write, read, write), 7):
-        ask(tns, data)
-    assert [reply.sts for reply in answers] == [7, 0, 0, 2, 7, 7, 7, 7, 0, 0]
+    ask(write, write, read)
+    ask(write)
+    assert [reply.sts for reply in answers] == [7, 7, 0, 0, 2, 7, 7, 7, 7, 7, 0, 0]
     assert bench.values_written() == [5, 5, 5]  # one was kept
