@@ -141,8 +141,12 @@ def test_rule_2_plc_behind_a_gateway_that_answers_at_all_is_a_first_contact(
     assert (plc.failures, beat.wants_zero) == (0, True)
 
 
-def test_rule_8_guests_write_over_a_0_is_written_over_at_once() -> None:
-    cell = GuestCell(beat_row(2000, requires=('speed',), timeout=300))
+@pytest.mark.parametrize('times', [0, 20])
+def test_rule_8_guests_write_over_a_0_is_written_over_at_once(times: int) -> None:
+    speed = speed_row(None)
+    cell = GuestCell(beat_row(2000, requires=('speed',), timeout=300), speed)
+    cell.publish(speed, 5, 20, run=2.5)
+    cell.publish(speed, 5, times, run=0.2)  # it may count again, when the 0 has stood long enough
     cell.ask('N10:0', 99)
     cell.bench.run_until(lambda: cell.word('N10:0') == 99)
     cell.run(0.1)

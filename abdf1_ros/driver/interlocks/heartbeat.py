@@ -194,10 +194,11 @@ class HeartbeatRow:
 
     def overwritten(self, now: float) -> None:
         """Write 0 again at once if the PLC has to hold 0: another value may have replaced it."""
-        if self.state is BeatState.SHOWN:
+        if self.value:
+            return
+        if self.state in (BeatState.SHOWN, BeatState.COUNTS):  # the 0 has to stand anew
             self.state = BeatState.CONTACT
-        if self.state is not BeatState.COUNTS and self.value == 0:
-            self._write_zero(now)
+        self._write_zero(now)
 
     def missing(self, messages: MappingType[str, float], now: float) -> str:
         """
