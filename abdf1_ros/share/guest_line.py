@@ -67,8 +67,10 @@ class GuestLine:
         self._queue = queue
         self._wake = wake
         self._endpoint: Endpoint | None = None
+        # No handshake: a device needs it for its own wiring, as a radio modem does.
         self._port = PortSettings(
-            place.name, place.baud or network.baud, parity=place.parity or network.parity)
+            place.name, place.baud or network.baud, network.data_bits,
+            place.parity or network.parity, network.stop_bits)
         checksum = place.check or network.checksum
         char_time = self._port.char_time if place.kind == 'serial' else 0.0
         self.machine = Machine(self._run, checksum=checksum, duplex=Duplex.FULL,
