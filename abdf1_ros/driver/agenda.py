@@ -148,8 +148,11 @@ class Agenda:
         Return the next job on a connection that has not been heard.
 
         After the first questions only one a second is sent, because the port may store them. A 0
-        or a fallback need not wait: it is a safe value even when it arrives late.
+        or a fallback need not wait: it is a safe value even when it arrives late. A message to all
+        stations need not wait either where no row names a single station.
         """
+        if not any(self._stations) and (write := self._write(now, busy)):
+            return write
         is_limited = self._questions >= _QUICK_QUESTIONS and now < self._next_question
         if is_limited:
             own = self._interlocks

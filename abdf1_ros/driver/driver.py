@@ -311,7 +311,7 @@ class Driver:
             elif reason := self._writes.why_too_old(write, now):
                 self._end_write(write, Outcome.NOT_SENT, reason)
             elif not write.mapping.serves:
-                if self.tasks.is_heard:
+                if self.tasks.is_heard or not any(self.stations):
                     self._writes.add(write, now)
                 else:
                     self._end_write(write, Outcome.NOT_SENT, _NOT_HEARD)
@@ -345,14 +345,15 @@ class Driver:
         """
         Send no message until a reply comes: the port may store it for long.
 
-        A line without stations to ask needs no reply, and neither does a line whose master polls
-        us.
+        On a line without stations to ask, only writes of guests need a reply. A line whose master
+        polls us needs none.
         """
         network = self.network
         if self._settings.may_store and not network.line_mode.is_polled \
                 and (network.share or any(self.stations)):
             self.tasks.connect()
-            self._writes.drop(_NOT_HEARD, self.machine.now)
+            if any(self.stations):
+                self._writes.drop(_NOT_HEARD, self.machine.now)
 
     def _run(self) -> Procedure:
         """Open the queues; return the procedure of the link, which ends with the port."""

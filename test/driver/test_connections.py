@@ -168,11 +168,13 @@ def test_row_without_a_read_is_asked_by_an_echo() -> None:
     assert bench.results() == ['written']
 
 
-def test_line_that_only_broadcasts_is_spared() -> None:
+@pytest.mark.parametrize('share', ['', 'tcp:6000'])
+def test_line_that_only_broadcasts_is_spared(share: str) -> None:
     every = make_mapping('N7:0', 'Write', station=255, plc='SLC')
-    bench = Queue(rows=[every])
-    bench.write(every, [3], run=0.5)
-    assert bench.listener.outcomes() == [Outcome.BROADCAST]
+    bench = Queue(rows=[every], share=share)
+    for value in range(15):  # more than the quick questions
+        bench.write(every, [value], run=0.3)
+    assert bench.listener.outcomes() == 15 * [Outcome.BROADCAST]
 
 
 @pytest.mark.parametrize('mode', ['Master', 'Peer'])
