@@ -354,6 +354,7 @@ class Driver:
             self.tasks.connect()
             if any(self.stations):
                 self._writes.drop(_NOT_HEARD, self.machine.now)
+                self.tasks.end_messages()
 
     def _run(self) -> Procedure:
         """Open the queues; return the procedure of the link, which ends with the port."""

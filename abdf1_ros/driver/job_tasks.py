@@ -28,8 +28,10 @@ import math
 from typing import Protocol, TypeVar
 
 from abdf1_ros.df1.packet import BROADCAST, Packet
-from abdf1_ros.errors import Abdf1Error, CommandExpired, LinkError
+from abdf1_ros.errors import Abdf1Error, CommandExpired, LinkError, StationInactive
+from abdf1_ros.pccc.describe import effect_of
 from abdf1_ros.pccc.dialect import Request, Steps
+from abdf1_ros.pccc.notation import Effect
 
 _With = TypeVar('_With', Packet, LinkError)
 
@@ -184,6 +186,13 @@ class JobTasks:
         for job in [job for job in self.waiting if now >= job.expires]:
             self._stop_waiting(job)
             job.fail(CommandExpired())
+
+    def end_messages(self) -> None:
+        """End the messages whose next packet waits: all stations are inactive."""
+        for job in [job for job in self.waiting
+                    if not job.is_own and effect_of(job.command) is not Effect.READS]:
+            self._stop_waiting(job)
+            job.fail(StationInactive(job.station))
 
     def _stop_waiting(self, job: Job) -> None:
         self.waiting.remove(job)

@@ -66,7 +66,7 @@ class _RequestJob(Job):
 
 
 class _Question(Job):
-    """An echo before a job; the job starts after the answer, and fails unsent without one."""
+    """An echo before a job; the job goes on after the answer, and fails unsent without one."""
 
     def __init__(self, job: Job) -> None:
         self.station = job.station
@@ -77,7 +77,7 @@ class _Question(Job):
         return echo(b'')
 
     def ended(self, error: Exception | None) -> None:
-        """Let the job start, or fail."""
+        """Let the job go on, or fail."""
         if isinstance(error, LinkError):
             self._job.fail(error)
         else:
@@ -149,7 +149,7 @@ class Requests(TaskSource):
         """Return the next command of the request under way, or of the next request."""
         under_way = self._tasks.first(busy)
         if under_way is not None:
-            return self._tasks.take(under_way, now)
+            return self._heard_first(self._tasks.take(under_way, now), now)
         self._taken += self._waiting.take()
         for request in [taken for taken in self._taken if taken.station not in busy]:
             self._taken.remove(request)
@@ -158,7 +158,7 @@ class Requests(TaskSource):
         return None
 
     def _heard_first(self, job: Job, now: float) -> Job:
-        """Return a started job, or the question before a job that may write."""
+        """Return a job with a command, or the question before a command that may write."""
         if self._tasks.is_heard or effect_of(job.command) is Effect.READS:
             return job
         return _Question(job).start(self._tasks, now)

@@ -160,6 +160,18 @@ def test_connection_whose_stations_are_all_silent_is_unheard_again() -> None:
     assert bench.values_written() == [1, 3]
 
 
+def test_later_packets_of_a_message_end_when_all_stations_are_silent() -> None:
+    recipe = make_mapping('N7:0', 'Write', plc='SLC', length=1000)
+    bench = Queue('Peer', [recipe, make_mapping('N9:0', plc='SLC', period=200)], is_open=True)
+    bench.run(0.5)
+    bench.write(recipe, 1000 * [7])
+    bench.run_until(lambda: len(bench.values_written()) == 4)  # then it is the turn of a read
+    bench.device.hear = bench.keep
+    bench.run(20.0)
+    assert max(len(data) for _, data in bench.stored) < 50
+    assert 'only partly written: 2509 ERR_INACTIVE_STATION' in bench.results()[0]
+
+
 def test_row_without_a_read_is_asked_by_an_echo() -> None:
     order = make_mapping('N7:0', 'Write', plc='SLC')
     bench = Queue(rows=[order], is_open=True)

@@ -134,6 +134,18 @@ def test_rule_26_port_that_may_store_gets_a_question_before_the_first_write_and_
     assert (sent, len(bench.ends.results)) == (commands, 3)
 
 
+def test_rule_26_question_also_goes_before_the_next_packet_of_a_write() -> None:
+    requests, ends = Requests(RADIO, NETWORK.line, ActiveStationList(), may_store=True), Ends()
+    requests.add(1, (write for write in 2 * [(0x0F, b'\xAA')]), ends.results.append, print)
+    requests.add(2, echo(b''), ends.results.append, ends.errors.append)
+    write, other = requests.next_task(0.0), requests.next_task(0.0)
+    assert write and other
+    write.reply(write.command.reply())
+    other.fail(StationInactive(2))
+    question = requests.next_task(0.0)
+    assert question and (question.command.dst, question.command.cmd) == (1, diagnostics.CMD)
+
+
 def test_present_station_gets_every_retry_and_an_absent_one_a_single_poll() -> None:
     bench = Bench()
     bench.add(9, identify())
