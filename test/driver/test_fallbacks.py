@@ -66,8 +66,8 @@ class OneRow(StillClock):
 
     def message(self, begun: float, done: float, outcome: Outcome) -> None:
         """Let a message end that was published when it began."""
-        self._write(Write(self.mapping, [3], begun), done, outcome)
-        self.row.message_ended(begun, outcome)
+        claim = self._write(Write(self.mapping, [3], begun), done, outcome)
+        self.row.write_ended(claim, done)
 
     def fallback(self, write: Write, done: float, outcome: Outcome = Outcome.WRITTEN
                  ) -> float | None:
@@ -79,11 +79,12 @@ class OneRow(StillClock):
         claim.done = claim.lands_until = now
         self.row.write_ended(claim, now)
 
-    def _write(self, write: Write, done: float, outcome: Outcome) -> None:
+    def _write(self, write: Write, done: float, outcome: Outcome) -> Claim:
         self.now = write.requested
         claim = self.record.begin(1, [self.mapping.extent], write)
         self.now = done
         self.record.ended(claim, outcome, may_land=outcome in (Outcome.UNKNOWN, Outcome.PARTLY))
+        return claim
 
 
 @pytest.mark.parametrize(('begun', 'again'), [(1.5, 2.0), (2.0, math.inf)])
@@ -199,6 +200,10 @@ def test_rule_7_time_of_a_message_after_an_unconfirmed_fallback_counts_once() ->
     for begun in 2.0, 2.2:
         one.message(begun, begun + 0.1, Outcome.UNKNOWN)
     assert [one.row.judge(2.0 + AFTER + late, -math.inf) for late in (-0.1, 0.0)] == [False, True]
+    one.fallback(one.row.take(2.5), 2.6, Outcome.UNKNOWN)
+    for begun, outcome in (2.7, Outcome.UNKNOWN), (2.8, Outcome.WRITTEN):
+        one.message(begun, begun, outcome)
+    assert one.row.judge(2.8, -math.inf)  # not later over a message of a PLC that is well again
 
 
 @pytest.mark.parametrize('gap', [0.1, 0.002])  # s; slower, and faster, than transactions are

@@ -209,6 +209,9 @@ class FallbackRow:
         if claim.write is not None:
             assert claim.outcome is not None
             self.message_ended(claim.write.requested, claim.outcome)
+            if claim.outcome is Outcome.WRITTEN:
+                # an unconfirmed message may have set a later time
+                self._due_since = min(self._due_since, now)
         elif claim.has_changed and self.stands:
             if claim.extents is None:  # its words are unknown, hardly these
                 self.refresh_at = now
