@@ -174,6 +174,7 @@ class Accounting(Tally):
             return
         local_status = reply.sts if reply.sts and is_local_status(reply.sts) else 0
         station = self._stations.records[number]
+        station.has_gateway |= local_status > 0
         # A gateway may execute diagnostic commands itself, whatever node they are for.
         is_gateways = reply.cmd == DIAGNOSTIC_REPLY and not local_status and (
             station.local_status or number in self._stations.routes)

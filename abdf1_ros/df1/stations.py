@@ -47,6 +47,7 @@ class Station:
     - ``unanswered``: the same number, but it also counts commands that kept no others waiting.
     - ``local_status``: STS of the last reply if a gateway sent it for the station; 0 if the
       station replied itself.
+    - ``has_gateway``: it is or was behind a gateway, which may hold commands; False if unknown.
     - ``returns``: how often the station has become active again since its last reply to a command.
     - ``other_number``: for a gateway, the DST of its last reply with a DST that was neither our
       number nor the gateway's.
@@ -65,6 +66,7 @@ class Station:
     overdue: int = 0
     unanswered: int = 0
     local_status: int = 0
+    has_gateway: bool = False
     returns: int = 0
     other_number: int | None = None
 

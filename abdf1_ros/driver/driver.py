@@ -117,6 +117,10 @@ class Driver:
             self.mappings.stations, self._station_changed,
             _routes(network, mappings), network.line_mode.longest_probe(network.line),
             self.machine.took, QUESTION_PERIOD if settings.may_store else 0.0)
+        # Only a gateway answers for several stations in full duplex.
+        are_behind = network.line_mode.has_one_plc and len(self.mappings.stations) > 1
+        for row in self.mappings.of_plcs:
+            self.stations[row.station].has_gateway |= are_behind or row.via is not None
         self.is_online = False
         self._settings = settings
         self._listener = listener

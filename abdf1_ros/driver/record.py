@@ -29,6 +29,7 @@ import math
 from typing import Protocol
 
 from abdf1_ros.df1.packet import BROADCAST
+from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.job_tasks import LineTime
 from abdf1_ros.driver.write import Outcome, Write
 from abdf1_ros.errors import LinkError, RemoteError
@@ -221,10 +222,10 @@ class WriteRecord:
         """Return the words of a row that the bridge writes by itself; watch them from now on."""
         return self._words.setdefault(row, OwnWords(row, self))
 
-    def opened(self) -> None:
+    def opened(self, stations: ActiveStationList) -> None:
         """Record that gateways may hold earlier writes: the port has been opened."""
         for words in self._words.values():
-            if words.row.via is not None:
+            if stations[words.row.station].has_gateway:
                 words.may_land((_Writer.BEFORE,), self.line.now + self._settle_time)
 
     def may_begin(self, row: Mapping) -> bool:

@@ -33,6 +33,7 @@ import pytest
 from support.cases import long_unless
 from support.driver_bench import DriverBench, simulated_plc, store, stored
 from support.mappings import make_mapping
+from support.odd_device import OddDevice, Wiring
 
 GATEWAY, FIRST, SECOND, DIRECT = 10, 1, 2, 3
 # A line that is polled without a pause is a slow one: fewer polls a second show the same.
@@ -80,7 +81,6 @@ def test_gateway_that_is_gone_takes_both_with_it_and_one_poll_brings_both_back(
         polling: str) -> None:
     bench = Bench(polling)
     bench.run(0.5)
-    hear = bench.far.hear
     frames_of = bench.gateway.slave.handle
     bench.gateway.slave.handle = lambda symbol: b''  # type: ignore[method-assign]
     bench.run(5.0)
@@ -99,7 +99,6 @@ def test_gateway_that_is_gone_takes_both_with_it_and_one_poll_brings_both_back(
     bench.listener.reads.clear()
     bench.run(1.0)
     assert bench.listener.values(bench.first) and bench.listener.values(bench.second)
-    assert bench.far.hear == hear
 
 
 @pytest.mark.parametrize('polling', POLLING)
@@ -342,3 +341,15 @@ def test_rules_2_and_8_plc_within_reach_again_is_a_first_contact(polling: str) -
     assert 0 not in bench.beats(0, since)  # the other one has been there all the time
     assert [str(result) for result in bench.listener.results][2:] == [
         'fallback value written: return']
+
+
+@pytest.mark.parametrize('nodes', [(FIRST, SECOND), (SECOND,)])
+def test_gateway_without_via_is_known_by_its_stations_or_its_status(
+        nodes: tuple[int, ...]) -> None:
+    device = OddDevice(Wiring.FULL, GATEWAY, nodes)
+    bench = DriverBench([make_mapping('N7:0', station=number, plc='SLC') for number in nodes],
+                        network=Network(mode='Peer'), far=device)
+    for number, there in enumerate((nodes, (), nodes)):
+        device.nodes = frozenset(there)
+        bench.run(1.0)
+        assert bench.driver.stations[SECOND].has_gateway is (len(nodes) > 1 or number > 0)

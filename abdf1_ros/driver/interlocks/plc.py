@@ -169,7 +169,7 @@ class Plc:
         whole line otherwise. A PLC behind a gateway that answers again has a first contact,
         because its station was active all the time (rules 2, 8).
         """
-        is_behind_gateway = self.rows[0].mapping.via is not None
+        is_behind_gateway = self._stations[self.station].has_gateway
         if claim.outcome in _ANSWERED:
             was_lost, self.failures, self.pause_end = self.is_lost, 0, -math.inf
             if was_lost and is_behind_gateway:
