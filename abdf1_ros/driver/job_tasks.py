@@ -59,7 +59,7 @@ class Job:
       and a Fallback never expire. The link checks it for all kinds before it sends; the queues
       also end expired jobs, so that their results are not late.
     - ``patience``: a later command expires this many seconds after the command before it, not
-      counting that command's time on the line.
+      counting that command's time on the line, but not after ``latest`` (clock value in s).
     - ``is_probe``: a silent station is asked whether it answers again.
     - ``is_own``: a heartbeat or a fallback, which no message has asked for.
     - ``blames``, ``answer_within``: see ``Task``.
@@ -71,6 +71,7 @@ class Job:
     reply_size = 0
     expires = math.inf
     patience = 0.0
+    latest = math.inf
     is_probe = False
     is_own = False
     blames = True
@@ -130,7 +131,8 @@ class Job:
         self.sent, self.reply_size = False, 0
         if self.patience:
             line_time = len(self.command.encode()) * self._tasks.char_time
-            self.expires = max(self.expires, self.taken + line_time + self.patience)
+            expires = max(self.expires, self.taken + line_time + self.patience)
+            self.expires = min(self.latest, expires)
         self.command = self._tasks.new_command(self.station, request)
         self._tasks.advanced(self)
 

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections import Counter
+import math
 
 from abdf1_ros.driver.agenda import MAX_WRITES_IN_A_ROW, QUESTION_PERIOD
 from abdf1_ros.driver.job_tasks import Job
@@ -49,15 +50,16 @@ def test_reads_come_when_they_are_due_and_the_period_counts_from_then() -> None:
     assert job.due == 0.1
 
 
-@pytest.mark.parametrize(('fallback', 'expires', 'patience'), [
-    (None, 3.5, 2.5), (FALLBACK, 2.0, 0.0)])
+@pytest.mark.parametrize(('fallback', 'limits'), [
+    (None, (3.5, 2.5, math.inf)), (FALLBACK, (2.0, 1.0, 2.0)),
+    (Fallback((7,), 9000), (3.5, 2.5, 10.5))])
 def test_message_has_its_patience_and_a_fallback_bounds_all_packets(
-        fallback: Fallback | None, expires: float, patience: float) -> None:
+        fallback: Fallback | None, limits: tuple[float, float, float]) -> None:
     bench, row = Bench(), make_mapping('N7:5', 'Write', fallback=fallback)
     for published in (1.0, 0.75):  # equal ones; the younger counts
         bench.write(row, 1, published)
     job = bench.writes.next(1.0)
-    assert job is not None and (job.expires, job.patience) == (expires, patience)
+    assert job is not None and (job.expires, job.patience, job.latest) == limits
 
 
 def test_four_writes_in_a_row_and_then_a_read_that_is_due() -> None:

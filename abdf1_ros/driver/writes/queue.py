@@ -132,10 +132,11 @@ class WriteQueue:
 
     def _job(self, write: Write) -> WriteJob:
         patience = self.patience_of(write.mapping) + self._slack
-        # If the row has a fallback, all packets of a long write have to be sent before the
-        # fallback is due.
-        return WriteJob(write, self._writing, write.requested + patience,
-                        patience=0.0 if write.mapping.fallback else patience)
+        fallback, latest = write.mapping.fallback, math.inf
+        if fallback:  # all packets of a long write have to be sent before it is due
+            latest = write.requested + fallback.after / 1000 + self._slack
+        return WriteJob(write, self._writing, write.requested + patience, patience=patience,
+                        latest=latest)
 
     def _gives_way(self, write: Write, now: float) -> bool:
         """Tell whether a write is superseded: the line cannot send all changes of its row."""

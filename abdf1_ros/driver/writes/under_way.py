@@ -44,12 +44,12 @@ class WriteJob(Job):
     result: WriteResult
 
     def __init__(self, write: Write, writing: WritesUnderWay, expires: float, *,
-                 patience: float = 0.0, is_free: bool = False,
+                 patience: float = 0.0, latest: float = math.inf, is_free: bool = False,
                  answer_within: float = math.inf) -> None:
         self.write = write
         self.station = write.mapping.station
         self.is_own = write.is_own
-        self.expires, self.patience = expires, patience
+        self.expires, self.patience, self.latest = expires, patience, latest
         self.is_free = is_free
         self.answer_within = answer_within
         self._writing = writing
