@@ -315,14 +315,18 @@ def test_rule_11_plc_out_of_reach_does_not_take_the_line_from_the_other(
 
 
 @pytest.mark.parametrize('polling', POLLING)
-def test_rule_10_gateway_may_hold_a_message_of_the_time_before_the_start(polling: str) -> None:
+def test_rule_10_gateway_may_hold_a_message_of_the_time_before_the_port_was_opened(
+        polling: str) -> None:
     bench = Interlocked(polling)
-    bench.run(0.3)
-    store(bench.plcs[0], 'N7:1', [800])  # it has let it go
-    bench.run(1.2)
-    assert stored(bench.plcs[0], 'N7:1') == b'\7\0'
-    assert [str(result) for result in bench.listener.results] == 2 * [
-        'fallback value written: start']
+    for cause in ('start', 'return'):
+        bench.run(0.3)
+        store(bench.plcs[0], 'N7:1', [800])  # it has let it go
+        bench.run(1.2)
+        assert stored(bench.plcs[0], 'N7:1') == b'\7\0'
+        assert {str(result) for result in bench.listener.results[-2:]} == {
+            f'fallback value written: {cause}'}
+        bench.lose_port()
+        bench.open()
 
 
 @pytest.mark.parametrize('polling', POLLING)

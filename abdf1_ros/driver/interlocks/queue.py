@@ -141,8 +141,8 @@ class Interlocks(WriteListener):
 
     def begin(self, now: float) -> None:
         """Begin a first contact with each station: the port has been opened (rule 2)."""
+        self._writing.record.opened(self._writing.stations)
         if not self._has_begun:
-            self._writing.record.opened(self._writing.stations)
             for row in self.fallbacks:
                 row.make_due(FallbackCause.START, now)
         self._has_begun = True
