@@ -23,7 +23,7 @@ docs/heartbeats.md ask this record about all writers.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Sequence
 from enum import auto, Enum
 import math
 from typing import Protocol
@@ -108,6 +108,9 @@ class Claim:
 
 class WriteListener:
     """A listener to all writes; methods that are not overridden do nothing."""
+
+    def opened(self, stations: Container[int], until: float) -> None:
+        """Take the stations whose gateways may hold earlier writes, and until when (clock, s)."""
 
     def write_begins(self, claim: Claim) -> None:
         """Take a write that now has the line."""
@@ -224,9 +227,13 @@ class WriteRecord:
 
     def opened(self, stations: ActiveStationList) -> None:
         """Record that gateways may hold earlier writes: the port has been opened."""
+        behind = {station.number for station in stations if station.has_gateway}
+        until = self.line.now + self._settle_time
         for words in self._words.values():
-            if stations[words.row.station].has_gateway:
-                words.may_land((_Writer.BEFORE,), self.line.now + self._settle_time)
+            if words.row.station in behind:
+                words.may_land((_Writer.BEFORE,), until)
+        for listener in self._listeners:
+            listener.opened(behind, until)
 
     def may_begin(self, row: Mapping) -> bool:
         """Tell whether no write of these words is under way: packets of writes must not mix."""

@@ -21,7 +21,7 @@ read proves that the PLC still holds its value.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from dataclasses import dataclass
 import math
 
@@ -58,6 +58,10 @@ class Standing(WriteListener):
         self._values: dict[Mapping, _Value] = {}
         self._settled: dict[Mapping, float] = {}  # no other write can land after it (clock, s)
         self._sharing: dict[Mapping, list[Mapping]] = {}  # cached, as it takes long to find out
+
+    def opened(self, stations: Container[int], until: float) -> None:
+        """Record no value of these stations before all writes of earlier times have landed."""
+        self._settled |= {row: until for row in self._patience if row.station in stations}
 
     def write_begins(self, claim: Claim) -> None:
         """Forget the values that a write may change."""
