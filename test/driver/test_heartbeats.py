@@ -404,6 +404,19 @@ def test_rule_19_second_foreign_value_is_one_within_a_minute_or_20_periods() -> 
         assert len(zeros) == 9 and 0.5 <= min(zeros) < max(zeros) < 1.5
 
 
+def test_rule_19_0_that_stays_is_written_at_the_end_and_repeated_like_any_other() -> None:
+    beat, = Cell(beat_row(60_000), start=False).bench.driver.interlocks.heartbeats
+    for now in (0.0, 2.0, 4.0):
+        beat.take(now)
+        beat.ended(Outcome.WRITTEN, now)
+        beat.read_back(5, now, now)
+    beat.end(5.0)  # not as late as the next 0 over a foreign value
+    assert beat.judge(5.0, '', 5.0, {})
+    beat.take(5.0)
+    beat.ended(Outcome.UNKNOWN, 5.5)
+    assert beat.judge(6.0, '', 6.0, {})
+
+
 @pytest.mark.parametrize('polling', POLLING_MODES)
 def test_rule_19_own_values_are_never_taken_for_those_of_another(polling: str) -> None:
     cell = Cell(beat_row(100), speed_row(), make_mapping('N10:1', period=100), polling=polling)

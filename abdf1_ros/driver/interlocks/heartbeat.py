@@ -181,10 +181,10 @@ class HeartbeatRow:
         self.next_beat = self.due = now
 
     def end(self, now: float) -> None:
-        """Let 0 be written at the end, also a second time if another write may still land."""
+        """Let 0 be written at the end, at once, also again if another write may still land."""
         self.due = now
         self.words.end(now)
-        if self.words.lands_until > -math.inf:
+        if not self.is_at_rest or self.words.lands_until > -math.inf:
             self._write_zero(now)
 
     def write_ended(self, claim: Claim, now: float) -> None:
@@ -318,9 +318,8 @@ class HeartbeatRow:
         elif self._is_confirmed:  # otherwise it stays the same (rule 3 a)
             before = self.value or self._before_first
             self.value, self._is_confirmed = before % LARGEST + 1, False
-        # The other bridge has to see our 0 between two of its own values.
-        is_urgent = self.wants_zero and self.state is not BeatState.CONFLICT
-        self.next_beat = now + (min(self._period, _REPEAT_ZERO) if is_urgent else self._period)
+        pause = min(self._period, _REPEAT_ZERO) if self.wants_zero else self._period
+        self.next_beat = now + pause
         self.due = math.inf
         return Write(self.mapping, [self.value], now, is_own=True)
 
