@@ -210,16 +210,6 @@ def test_request_without_a_command_ends_when_the_link_takes_commands() -> None:
     assert ends.results == [None]
 
 
-def test_other_modes_are_served_by_the_same_requests() -> None:
-    requests = Requests(PEER, Network(baud=115200).line, ActiveStationList())
-    ends = Ends()
-    requests.add(1, identify(), ends.results.append, ends.errors.append)
-    requests.machine.start(0.0)
-    requests.machine.handle_timeout(0.1)
-    assert requests.machine.data_to_send().startswith(b'\x10\x02\x01\x05\x06\x00')
-    assert ends.count() == 0
-
-
 def test_station_has_one_request_at_a_time_by_radio() -> None:
     """The second one took the place of the first, which then never ended."""
     requests = Requests(RADIO, replace(NETWORK.line, avoids_collisions=True),
