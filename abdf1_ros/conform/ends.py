@@ -30,7 +30,16 @@ POLL_PAUSE = 0.02
 # Longest wait (s) for the next message of a target that sends by itself.
 PATIENCE = 30.0
 
+# Longest time (s) that a node may wait for the response to its message before it sends DLE ENQ.
+# The defaults of the products are 1 to 4.4 s (M 7-25, 7-27).
+LONGEST_ACK_TIMEOUT = 20.0
+
 HIGHEST_LIMIT = 255  # highest setting of any product for repetitions and enquiries
+
+
+def ack_timeout(wire: Wire) -> float:
+    """Return a time (s) in which DLE ENQ comes, from the measured time after a first DLE ENQ."""
+    return min(LONGEST_ACK_TIMEOUT, 1.5 * wire.enquired_after + 1.0)
 
 
 def expect_end_of_naks(wire: Wire, message: bytes, patience: float) -> None:

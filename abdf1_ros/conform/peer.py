@@ -20,23 +20,17 @@ from abdf1_ros.conform import codec
 from abdf1_ros.conform.case import case, Target
 from abdf1_ros.conform.codec import Symbol, SymbolKind
 from abdf1_ros.conform.ends import (
+    ack_timeout,
     check_reply,
     expect_end_of_enquiries,
     expect_end_of_naks,
+    LONGEST_ACK_TIMEOUT,
     MOST_TRIES,
     PeerEnd,
 )
 from abdf1_ros.conform.wire import expect_same, Failed
 
 _PEER = Target.PEER
-# Longest time (s) that a node may wait for the response to its message before it sends DLE ENQ.
-# The defaults of the products are 1 to 4.4 s (M 7-25, 7-27). After a first DLE ENQ, the limit is
-# computed from the measured time.
-_LONGEST_ACK_TIMEOUT = 20.0
-
-
-def _ack_timeout(end: PeerEnd) -> float:
-    return min(_LONGEST_ACK_TIMEOUT, 1.5 * end.wire.enquired_after + 1.0)
 
 
 def _answer(end: PeerEnd, frame: bytes, kind: SymbolKind) -> None:
@@ -103,20 +97,20 @@ def reply_repeated_after_nak(end: PeerEnd) -> None:
 @case('A message that is always answered with DLE NAK is given up.', 'M 4-5', _PEER)
 def nak_limit(end: PeerEnd) -> None:
     end.deliver(end.command())
-    expect_end_of_naks(end.wire, end.collect(acknowledge=False), _ack_timeout(end))
+    expect_end_of_naks(end.wire, end.collect(acknowledge=False), ack_timeout(end.wire))
 
 
 @case('A message without any response is followed by DLE ENQ; DLE ACK ends it.', 'M 4-5', _PEER)
 def silence_is_enquired(end: PeerEnd) -> None:
     end.deliver(end.command())
     end.collect(acknowledge=False)
-    end.wire.expect(SymbolKind.ENQ, within=_LONGEST_ACK_TIMEOUT)
+    end.wire.expect(SymbolKind.ENQ, within=LONGEST_ACK_TIMEOUT)
     end.wire.send(codec.ACK)
     _expect_no_enquiry(end)
 
 
 def _expect_no_enquiry(end: PeerEnd) -> None:
-    symbol = end.wire.hear(_ack_timeout(end), answers=False)
+    symbol = end.wire.hear(ack_timeout(end.wire), answers=False)
     if symbol is not None:
         raise Failed('silence: the message has been acknowledged', str(symbol))
 
@@ -132,7 +126,7 @@ def no_needless_enquiry(end: PeerEnd) -> None:
 def enquiry_limit(end: PeerEnd) -> None:
     end.deliver(end.command())
     end.collect(acknowledge=False)
-    symbol = expect_end_of_enquiries(end.wire, _ack_timeout(end))
+    symbol = expect_end_of_enquiries(end.wire, ack_timeout(end.wire))
     if symbol is not None:
         raise Failed('DLE ENQ, or silence', str(symbol))
 
@@ -160,7 +154,7 @@ def embedded_response(end: PeerEnd) -> None:
     first, second = end.command(body=b'\x00one'), end.command(body=b'\x00two')
     end.deliver(first)
     check_reply(first, end.collect(acknowledge=False))
-    heard = _embed(end, second, codec.ACK), _hear_next(end)
+    heard = _embed(end, second, codec.ACK), end.wire.hear(ack_timeout(end.wire), answers=False)
     kinds = {symbol.kind: symbol for symbol in heard if symbol}  # the reply may be the first
     if SymbolKind.ACK not in kinds:
         raise Failed('DLE ACK for a message with an embedded response', str(heard[0] or 'silence'))
@@ -175,7 +169,8 @@ def embedded_nak(end: PeerEnd) -> None:
     end.deliver(first)
     refused = check_reply(first, end.collect(acknowledge=False))
     response = _embed(end, second, codec.NAK)
-    heard = {symbol.kind: symbol for symbol in (response, _hear_next(end)) if symbol}
+    heard = {symbol.kind: symbol for symbol in (
+        response, end.wire.hear(ack_timeout(end.wire), answers=False)) if symbol}
     again = heard.get(SymbolKind.MESSAGE)
     if again is None or again.data != refused:
         raise Failed('the reply again that was refused', again.data.hex(' ') if again else

@@ -87,7 +87,7 @@ Habit = Enum('Habit', [
     'RESPONSE_IS_DATA',  # one inside a message
     'RESPONSE_INSIDE_IGNORED', 'EMBEDS_RESPONSES', 'NO_REPETITION',
     'SILENCE_REPEATED',  # the message instead of DLE ENQ
-    'ENQUIRES_ALWAYS',  # 100 ms after each message
+    'ENQUIRES_ALWAYS',  # 600 ms after each message
     'ENQ_AFTER_NOISE_OLD',  # DLE ENQ gets the response of before the noise
     'EMBEDDED_NAK_IGNORED', 'EMBEDDED_NAK_AS_ACK', 'ENQUIRES_FOR_EVER',
     'DROPS_MESSAGE_AROUND',  # the first response inside of one
@@ -610,7 +610,7 @@ class _FullDuplex(Wire):
         self.say(self.frame(self._outgoing[0]))
         self._wait()
         if self.has(Habit.ENQUIRES_ALWAYS):
-            self.say(bytes((_DLE, _ENQ)), 0.1)
+            self.say(bytes((_DLE, _ENQ)), 0.6)
 
     def _wait(self) -> None:
         self._sending += 1
