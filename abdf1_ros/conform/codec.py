@@ -193,8 +193,8 @@ def _poll(buffer: bytes) -> Symbol | None:
     if found is None or len(buffer) <= found[1]:
         return None
     station, end = found
-    return Symbol(SymbolKind.POLL, buffer[:end + 1], station=station,
-                  is_good=buffer[end] == bcc((station,)))
+    raw = buffer[:end + 1]
+    return Symbol(SymbolKind.POLL, raw, station=station, is_good=raw == poll(station))
 
 
 def _master_message(buffer: bytes, check: BlockCheck) -> Symbol | None:

@@ -538,6 +538,8 @@ def test_frames_are_those_of_the_manual(frame: bytes, printed: str) -> None:
     ('10 05 11 EF', True, Symbol(SymbolKind.POLL, bytes.fromhex('100511EF'), station=0x11)),
     ('10 05 11 EE', True, Symbol(SymbolKind.POLL, bytes.fromhex('100511EE'), station=0x11,
                                  is_good=False)),
+    ('10 05 10 F0', True, Symbol(SymbolKind.POLL, bytes.fromhex('100510F0'), station=0x10,
+                                 is_good=False)),  # not doubled
     ('55 00 10 06', True, Symbol(SymbolKind.NOISE, b'\x55\x00')),
     ('10 02 08 10 10 10 03 E8', True,
      Symbol(SymbolKind.MESSAGE, bytes.fromhex('1002081010 1003E8'), b'\x08\x10')),
