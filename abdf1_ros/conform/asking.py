@@ -20,7 +20,7 @@ from collections.abc import Callable
 
 from abdf1_ros.conform import codec
 from abdf1_ros.conform.case import case, Target
-from abdf1_ros.conform.codec import Symbol, SymbolKind
+from abdf1_ros.conform.codec import Symbol
 from abdf1_ros.conform.ends import AnsweringEnd, HIGHEST_LIMIT, PATIENCE
 from abdf1_ros.conform.wire import Failed, Skipped
 
@@ -57,14 +57,12 @@ def tns_differs(end: AnsweringEnd) -> None:
 @case('A command that is never answered is given up.', 'M 3-13 to 3-15, SLC 13-76 to 13-80',
       Target.MASTER, Target.RADIO_CLIENT)
 def repetitions_limited(end: AnsweringEnd) -> None:
-    first = end.next_command()
+    header = end.next_command().data[:codec.HEADER_SIZE]
     for _ in range(HIGHEST_LIMIT + 1):
         try:
-            again = end.wire.until(
-                lambda symbol: symbol.kind is not SymbolKind.POLL, 'the next command', PATIENCE)
+            end.wire.until(lambda symbol: symbol.data[:codec.HEADER_SIZE] == header,
+                           'the command once more', PATIENCE)
         except Failed:
-            return
-        if again.data != first.data:
             return
     raise Failed(f'the command given up after {HIGHEST_LIMIT} repetitions at the latest, the '
                  'highest limit of the products', 'the command once more')

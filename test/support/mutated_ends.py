@@ -909,6 +909,8 @@ class MutatedMaster(Wire):
                              1000 if self.has(Habit.REPEATS_FOR_EVER) else 1 + _LIMIT):
             if attempt:
                 command = self._asker.renewed(command)
+                if self.has(Habit.REPEATS_FOR_EVER):
+                    self.say(bytes((_DLE, _NAK)))
             self.say(self.frame(command, 1))
             symbol = yield _ACK_TIMEOUT
             if symbol == (_ACK,):
