@@ -65,6 +65,9 @@ class End(Protocol):
     def settle(self) -> None:
         """Wait until the target has finished the work of the case before."""
 
+    def check_target(self) -> None:
+        """Raise Skipped if the case has ended in silence, and the target does not answer."""
+
 
 CaseScript: TypeAlias = Callable[[Any], None]
 """Plays a case with the End for its targets; raises Failed or Skipped."""
@@ -135,6 +138,7 @@ def run_cases(cases: Iterable[Case], wire: Wire, end: End,
             wire.begin(LONGEST_CASE + begun - wire.now)
             begun = wire.now
             entry.run(end)
+            end.check_target()
         except Failed as failure:
             verdict, expected, got = Verdict.FAIL, failure.expected, failure.got
         except Skipped as reason:

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 
 from abdf1_ros.conform import codec
@@ -149,6 +150,15 @@ class AskingEnd(ABC):
     @abstractmethod
     def settle(self) -> None:
         """Receive the messages that the target still has to send, before a case begins."""
+
+    def check_target(self) -> None:
+        """Send a command if the case has ended in silence; raise Skipped if that goes on."""
+        for _ in range(MOST_TRIES):
+            if self.wire.is_silent:
+                with suppress(Failed):
+                    self.carry_out(self.command())
+        if self.wire.is_silent:
+            raise Skipped('not tried: the target does not answer')
 
     def frame(self, command: bytes) -> bytes:
         """Return the frame of a message."""
@@ -359,6 +369,9 @@ class AnsweringEnd(ABC):
             except Failed:  # the case will show it; the target may still be busy
                 continue
             return
+
+    def check_target(self) -> None:  # noqa: B027
+        """Do nothing: each case begins with a command of the target."""
 
     @abstractmethod
     def next_command(self, what: str = '') -> Symbol:

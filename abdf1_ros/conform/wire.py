@@ -130,13 +130,18 @@ class Wire:
         self.transcript.clear()
         self.allow(limit)
 
-    def allow(self, seconds: float) -> None:
-        """Give the case ``seconds`` from now, whatever it has taken."""
-        self._limit = self._clock() + seconds
+    @property
+    def is_silent(self) -> bool:
+        """Tell whether no symbol has come since we last sent anything but a response."""
+        for entry in reversed(self.transcript):
+            if isinstance(entry, Sent) and entry.raw not in (codec.ACK, codec.NAK):
+                return True
+            if isinstance(entry, Symbol) and entry.kind is not SymbolKind.NOISE:
+                break
+        return False
 
-    def _time_left(self) -> float:
-        left = self._limit - self._clock()
-        if left <= 0:
+    def _check_limit(self) -> None:
+        if self._clock() > self._limit:
             raise Skipped('not judged: it takes too long')
         return left
 

@@ -363,6 +363,14 @@ class Babble:
         self.sent += data
 
 
+@for_all('name', [
+    'bad-poll-ignored', 'other-station-ignored', 'crc-covers-station', 'broadcast-unanswered',
+    'full-is-silent', 'bad-check-ignored', 'short-message-ignored', 'poll-idle'])
+def test_rule_is_not_tried_where_nobody_is(name: str) -> None:
+    result, = results_of(Babble(), Target.SLAVE, 'CRC', only=name)
+    assert result.verdict is Verdict.SKIP
+
+
 class TwoMasters:
     """Two masters on one line, which do not know of each other."""
 
