@@ -36,6 +36,7 @@ _ECHO = 0x06
 _TYPED = 0x0F
 _ILLEGAL = 0x10  # STS: command code, sub-code, length or format not accepted (M 8-2)
 _EXTENDED = 0xF0  # STS: an EXT STS follows (M 8-3)
+_INTEGER, _ARRAY = 4, 9  # types of a PLC-5's data (M 7-29)
 
 # Sizes (bytes) of an echo that every product accepts. SLC 5/01 and 5/02 accept up to 95 bytes, a
 # PLC-5 up to 243.
@@ -172,12 +173,34 @@ def _masked_body(words: Words, mask: int, bits: int) -> bytes:
     return b'\x26\x06' + place[0] + place[1] + keep + (bits & mask).to_bytes(2, 'little')
 
 
-def _read(end: AskingEnd, count: int, words: Words | None = None) -> bytes:
+def _type_of(data: bytes) -> tuple[int, int, bytes]:
+    """Return type and size of a PLC-5's data, and what follows them (M 7-28, 7-29)."""
+    fields, rest = [], data[1:]
+    for bits in (data[0] >> 4, data[0] & 0x0F) if data else (0, 0):
+        more = bits & 0x07 if bits & 0x08 else 0
+        fields.append(int.from_bytes(rest[:more], 'little') if bits & 0x08 else bits)
+        rest = rest[more:]
+    return fields[0], fields[1], rest
+
+
+def _integers(reply: bytes, count: int, family: str) -> bytes:
     """Return ``count`` integers as bytes, without the type that a PLC-5 puts before them."""
-    data = _data(end.ask(_TYPED, _read_body(words or end.words, count)))
-    if len(data) < 2 * count:
-        raise Failed(f'{2 * count} bytes of data', data.hex(' '))
-    return data[len(data) - 2 * count:]
+    data = words = _data(reply)
+    if family == 'PLC5':
+        kind, size, words = _type_of(data)
+        if kind == _ARRAY and not any(words[size:]):  # 00 may follow
+            kind, size, words = _type_of(words[:size])
+        if (kind, size) != (_INTEGER, 2):
+            raise Failed(f'{count} integers after their type', data.hex(' '))
+    if len(words) != 2 * count:
+        raise Failed(f'{2 * count} bytes of data', words.hex(' '))
+    return words
+
+
+def _read(end: AskingEnd, count: int, words: Words | None = None) -> bytes:
+    """Return ``count`` integers as bytes."""
+    words = words or end.words
+    return _integers(end.ask(_TYPED, _read_body(words, count)), count, words.family)
 
 
 @contextmanager
@@ -239,9 +262,8 @@ def read_words(end: AskingEnd) -> None:
     _read(end, 1)
 
 
-@case('A PLC-5 takes an address with and without its data table area, in long form, and as text.',
-      'M 13-10 to 13-15', *_ANSWERING)
-def address_forms(end: AskingEnd) -> None:
+def _address_forms(end: AskingEnd) -> list[bytes]:
+    """Return all forms of the address of the words; raises Skipped if it is not a PLC-5's."""
     words = _words_of(end)
     if words.family != 'PLC5':
         raise Skipped('only a PLC-5 has these forms')
@@ -250,12 +272,36 @@ def address_forms(end: AskingEnd) -> None:
                     for level in (words.file, words.element))
     text = b'\x00$' + words.address.encode() + b'\x00'
     forms = [b'\x07\x00' + place, b'\x06' + place] if place else []
-    for address in (*forms, b'\x06' + long, text):
-        body = b'\x68\x00\x00\x01\x00' + address + b'\x01\x00'
+    return [*forms, b'\x06' + long, text]
+
+
+def _ask_at(end: AskingEnd, address: bytes) -> bytes:
+    """Return the reply of a PLC-5 to a read of one word."""
+    return end.ask(_TYPED, b'\x68\x00\x00\x01\x00' + address + b'\x01\x00')
+
+
+@case('A PLC-5 takes an address with and without its data table area, in long form, and as text.',
+      'M 13-10 to 13-15', *_ANSWERING)
+def address_forms(end: AskingEnd) -> None:
+    for address in _address_forms(end):
         try:
-            _data(end.ask(_TYPED, body))
+            _data(_ask_at(end, address))
         except Failed as failure:
             raise Failed(f'STS 00 for the address {address.hex(" ")}', failure.got) from None
+
+
+@case('A PLC-5 finds the same word by every form of its address that it takes.',
+      'M 13-10 to 13-15', *_ANSWERING, permission=Permission.WRITE)
+def address_forms_agree(end: AskingEnd) -> None:
+    forms, wanted = _address_forms(end), b'\x34\x12'
+    before = _read(end, 1)
+    try:
+        _data(end.ask(_TYPED, _write_body(end.words, wanted)))
+        for reply, address in ((_ask_at(end, address), address) for address in forms):
+            if not reply[3] and (got := _integers(reply, 1, 'PLC5')) != wanted:
+                raise Failed(f'{wanted.hex(" ")} at {address.hex(" ")}', got.hex(' '))
+    finally:
+        _data(end.ask(_TYPED, _write_body(end.words, before)))
 
 
 @case('An element that does not exist is refused, not answered with data.',

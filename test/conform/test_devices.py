@@ -38,7 +38,7 @@ TRIES = 9  # of a reply: devices hold some back
 BYTE_TIME = 0.005  # s, where each byte comes by itself
 
 # Of this PLC, its family, a line without CRC; then what some devices cannot be asked for.
-NOT_HERE = {'address-forms', 'poll-stuffing', 'crc-covers-station'}
+NOT_HERE = {'address-forms', 'address-forms-agree', 'poll-stuffing', 'crc-covers-station'}
 NOT_ASKED = {'loses_every_third_answer': {'other-ack-ignored'}, 'no_eot': {'poll-idle'}}
 
 

@@ -54,7 +54,8 @@ FAULTS = [(target, habit, name) for targets, habit, name in [
     (ALL, Habit.CUTS_ECHO_AT_80, 'echo-sizes'), (ALL, Habit.CUTS_ECHO, 'largest-packet'),
     (ALL, Habit.EXCHANGES_TNS, 'tns-returned'), (ALL, Habit.DOES_ALL_COMMANDS, 'unknown-command'),
     (ALL, Habit.DOES_ALL_FUNCTIONS, 'unknown-function'), (ALL, Habit.NO_IDENTITY, 'identity'),
-    (ALL, Habit.READS_SHORT, 'read-words'), (ALL, Habit.READS_ZEROS_BEYOND, 'element-too-high'),
+    (ALL, Habit.READS_SHORT, 'read-words'), (ALL, Habit.READS_LONG, 'read-words'),
+    (ALL, Habit.READS_ZEROS_BEYOND, 'element-too-high'),
     (ALL, Habit.WRITES_NOTHING, 'write-and-read'), (ALL, Habit.MASKS_NOTHING, 'masked-write'),
     (BOTH, Habit.DUPLICATE_WITHOUT_ACK, 'duplicate-discarded'),
     (ALL, Habit.DUPLICATE_BY_COMMAND_AND_SOURCE, 'new-tns-executed'),
@@ -239,7 +240,7 @@ ALLOWED = [(target, habit, names) for targets, habit, names in [
     (SENDER, Habit.SENDS_ON, set()),
 ] for target in targets]
 
-NOT_HERE = {'address-forms', 'poll-stuffing'}  # for a PLC-5, and for station 16
+NOT_HERE = {'address-forms', 'address-forms-agree', 'poll-stuffing'}  # for a PLC-5, for station 16
 SETTINGS = {'crc-covers-station', 'sent-on-once'}  # for a CRC, and for a node that sends on
 
 
@@ -326,10 +327,12 @@ def test_poll_of_station_16_is_to_be_read_doubled() -> None:
     assert (result(), result(Habit.POLL_NOT_DOUBLED)) == (Verdict.PASS, Verdict.FAIL)
 
 
-@for_all('station', [7, 252, 253, 254])
-def test_radio_node_of_any_number_is_right(station: int) -> None:
-    line = MutatedRadioNode('CRC', station=station)
-    assert failures(results_of(line, Target.RADIO, 'CRC', station=station)) == []
+@for_all(('habit', 'name'), [(Habit.READS_SHORT, 'read-words'), (Habit.READS_LONG, 'read-words'),
+                             (Habit.TEXT_IS_N7_0, 'address-forms-agree')])
+def test_fault_of_a_plc5_is_found(habit: Habit, name: str) -> None:
+    line = MutatedPeer('CRC', habit, family='PLC5')
+    result, = results_of(line, Target.PEER, 'CRC', 'PLC5', only=name)
+    assert result.verdict is Verdict.FAIL and not set().union(*line.files) - {0}
 
 
 def test_plc5_that_refuses_an_area_fails_address_forms() -> None:

@@ -48,8 +48,8 @@ Habit = Enum('Habit', [
     'EXECUTES_DUPLICATES', 'COUNTS_NOTHING', 'DUPLICATE_WITHOUT_ACK', 'DUPLICATE_BY_TNS',
     'DUPLICATE_WITHOUT_SOURCE', 'DUPLICATE_BY_COMMAND_AND_SOURCE', 'REMEMBERS_99', 'UNSTUFFED',
     'BAD_CHECK_OF_HIGH_BYTES', 'CUTS_ECHO', 'CUTS_ECHO_AT_80', 'SMALL_PACKETS', 'EXCHANGES_TNS',
-    'DOES_ALL_COMMANDS', 'DOES_ALL_FUNCTIONS', 'NO_IDENTITY', 'READS_SHORT', 'READS_ZEROS_BEYOND',
-    'WRITES_NOTHING', 'MASKS_NOTHING', 'REFUSES_AREA',
+    'DOES_ALL_COMMANDS', 'DOES_ALL_FUNCTIONS', 'NO_IDENTITY', 'READS_SHORT', 'READS_LONG',
+    'READS_ZEROS_BEYOND', 'WRITES_NOTHING', 'MASKS_NOTHING', 'REFUSES_AREA', 'TEXT_IS_N7_0',
     'SLOW',  # each response and reply 300 ms late
     'LATE_REPLY',  # 300 ms after the command
     'VERY_LATE_REPLY',  # 3 s
@@ -367,8 +367,9 @@ class _Executor:
                       or fnc == b'\xA2' and has(Habit.READS_ZEROS_BEYOND))
         if reply[3] and is_lenient:
             reply = self._done(data) + bytes(2)
-        if fnc in (b'\xA2', b'\x68') and has(Habit.READS_SHORT):
-            reply = reply[:-1]
+        if fnc in (b'\xA2', b'\x68'):
+            reply = reply[:-1] if has(Habit.READS_SHORT) else reply
+            reply = reply[:6] + bytes(2 * has(Habit.READS_LONG)) + reply[6:]
         if has(Habit.EXCHANGES_TNS):
             reply = reply[:4] + reply[5:3:-1] + reply[6:]
         return reply
@@ -383,6 +384,8 @@ class _Executor:
             if has(Habit.MASK_SETS_ONLY):
                 mask = bytes(one & other for one, other in zip(mask, bits, strict=True))
             return before + (bits + mask if has(Habit.MASK_EXCHANGED) else mask + bits)
+        if data[11:13] == b'\x00$' and has(Habit.TEXT_IS_N7_0):
+            return data[:11] + b'\x06\x07\x00\x01\x00'
         if fnc == b'\xA2' and has(Habit.READS_NEXT_WORD):
             return data[:10] + bytes((data[10] + 1 & 0xFF,)) + data[11:]
         if fnc != b'\xAA':
