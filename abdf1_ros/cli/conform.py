@@ -258,7 +258,9 @@ def _end(options: argparse.Namespace, target: Target, wire: Wire, network: Netwo
         return kind(wire, options.station, network.station, random.randrange(0x10000), words)
     if target is Target.MASTER:
         return SlaveEnd(wire, options.station, serve)
-    return RadioServerEnd(wire, serve) if target.is_radio else ServerEnd(wire, serve)
+    if target.is_radio:
+        return RadioServerEnd(wire, options.station, serve)
+    return ServerEnd(wire, serve)
 
 
 def _integer_words(text: str) -> tuple[int, int]:

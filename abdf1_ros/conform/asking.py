@@ -101,7 +101,7 @@ def expect_not_used(end: AnsweringEnd, *answers: Callable[[Symbol], None]) -> No
     """Give answers that are not replies: the next command must come as late as without a reply."""
     answered, command = _follows(end, end.next_command(), end.finish)
     unanswered, command = _follows(end, command, end.acknowledge)
-    if unanswered < 2 * answered + _CLEARLY:
+    if unanswered < 2 * answered + _CLEARLY or end.has_further:
         raise Skipped('not judged: the next command comes as soon after no reply as after a reply')
     for answer in answers:
         for _ in range(2):  # so that the target does not count us as inactive

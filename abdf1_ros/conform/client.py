@@ -59,7 +59,7 @@ def silence_enquired(end: ServerEnd) -> None:
 def no_needless_enquiry(end: ServerEnd) -> None:
     command = end.next_command()
     end.wire.send(codec.ACK)
-    symbol = end.wire.hear(ack_timeout(end.wire), answers=False)
+    symbol = end.hear(ack_timeout(end.wire), answers=False)
     end.reply_to(command)
     if symbol is not None and symbol.kind is SymbolKind.ENQ:
         raise Failed('no DLE ENQ after DLE ACK', str(symbol))
@@ -94,7 +94,7 @@ def _refuse(end: ServerEnd, *then: bytes) -> None:
     reply = codec.message(end.serve(command.data), end.wire.check)
     for raw in (*codec.all_damaged(reply, end.wire.check), *then):
         end.wire.send(raw)
-        end.wire.expect(SymbolKind.NAK)
+        end.expect(SymbolKind.NAK)
     end.reply_and_hear(command, 'DLE ACK for the good reply')
 
 
@@ -103,7 +103,7 @@ def bad_reply_not_used(end: ServerEnd) -> None:
     def answer(command: Symbol) -> None:
         end.wire.send(codec.ACK)
         end.wire.send(codec.damaged(codec.message(end.serve(command.data), end.wire.check)))
-        end.wire.expect(SymbolKind.NAK)
+        end.expect(SymbolKind.NAK)
 
     expect_not_used(end, answer)
 
@@ -147,4 +147,4 @@ def embedded_response(end: ServerEnd) -> None:
     command = end.next_command()
     begun, rest = codec.divided(codec.message(end.serve(command.data), end.wire.check))
     end.wire.send(begun + codec.ACK + rest)
-    end.wire.expect(SymbolKind.ACK, 'DLE ACK for a reply with an embedded response')
+    end.expect(SymbolKind.ACK, 'DLE ACK for a reply with an embedded response')

@@ -150,8 +150,7 @@ def has_10_in_check(frame: bytes, check: BlockCheck) -> bool:
 
 def is_command(symbol: Symbol) -> bool:
     """Tell whether a symbol is a good message with a command (M 6-3)."""
-    return symbol.kind is SymbolKind.MESSAGE and symbol.is_good \
-        and len(symbol.data) >= HEADER_SIZE and not symbol.data[2] & REPLY_BIT
+    return symbol.is_good and len(symbol.data) >= HEADER_SIZE and not symbol.data[2] & REPLY_BIT
 
 
 def is_reply(symbol: Symbol) -> bool:

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -69,7 +70,7 @@ def expect_end_of_enquiries(wire: Wire, patience: float) -> Symbol | None:
 
 
 MOST_TRIES = 3  # tries to send to a full sink, and to answer a command before a case
-_MOST_COMMANDS = 20  # commands in a row that a slave sends by itself
+_MOST_COMMANDS = 20  # commands in a row that a slave sends by itself, or a master without a reply
 
 # Longest time of a reply, in answer times.
 _REPLY_TIMES = 5
@@ -349,11 +350,21 @@ Serve = Callable[[bytes], bytes]
 
 
 class AnsweringEnd(ABC):
-    """The common part of all ends that answer commands."""
+    """
+    The common part of all ends that answer commands.
+
+    The target may send further commands before the one in hand has its reply (M 4-6). They are
+    acknowledged, and answered after it. ``has_further`` tells whether such a command has come.
+    """
+
+    station: int | None = None  # of a master's message
 
     def __init__(self, wire: Wire, serve: Serve) -> None:
         self.wire = wire
+        self.has_further = False
         self._serve = serve
+        self._further: deque[Symbol] = deque()
+        self._in_hand = bytes(codec.HEADER_SIZE)
 
     def serve(self, command: bytes) -> bytes:
         """Execute a command, and return its reply; raise Failed if it has no whole header."""
@@ -387,7 +398,29 @@ class AnsweringEnd(ABC):
             raise Skipped(f'not tried: no command has come within {PATIENCE:g} s') from None
         if not symbol.is_good:
             raise Failed('a message with the right check', symbol.raw.hex(' '))
+        self._in_hand = symbol.data
         return symbol
+
+    def keeps(self, symbol: Symbol) -> bool:
+        """If a symbol is a further command, acknowledge it, keep it, and return True."""
+        if symbol.station != self.station or not codec.is_command(symbol) or \
+                symbol.data[4:6] == self._in_hand[4:6] or len(self._further) == _MOST_COMMANDS:
+            return False
+        self.wire.send(codec.ACK)
+        self._further.append(symbol)
+        self.has_further = True
+        return True
+
+    def hear(self, within: float | None = None, *, answers: bool = True) -> Symbol | None:
+        """Return the next symbol that is not a further command; see ``Wire.hear``."""
+        symbol = self.wire.hear(within, answers=answers)
+        while symbol is not None and self.keeps(symbol):
+            symbol = self.wire.hear(within, answers=answers)
+        return symbol
+
+    def expect(self, kind: SymbolKind, what: str = '', within: float | None = None) -> Symbol:
+        """Return the next symbol that ``hear`` returns; see ``Wire.expect``."""
+        return self.wire.expect(kind, what, within, self.hear)
 
     def acknowledge(self, command: Symbol) -> None:
         """Acknowledge a command, if this discipline has acknowledgements."""
@@ -399,7 +432,7 @@ class AnsweringEnd(ABC):
 
     def expect_taken(self, command: Symbol) -> None:
         """Expect that the target has accepted the reply to a command."""
-        self.wire.expect(SymbolKind.ACK, 'DLE ACK for a good reply')
+        self.expect(SymbolKind.ACK, 'DLE ACK for a good reply')
 
     @abstractmethod
     def finish(self, command: Symbol) -> None:
@@ -412,7 +445,7 @@ class AnsweringEnd(ABC):
     def reply_and_hear(self, command: Symbol, what: str = 'DLE ACK for a good reply') -> None:
         """Send the reply to a command, and hear the ACK; Failed says ``what`` was expected."""
         self.reply_to(command)
-        self.wire.expect(SymbolKind.ACK, what)
+        self.expect(SymbolKind.ACK, what)
 
 
 class SlaveEnd(AnsweringEnd):
@@ -423,10 +456,13 @@ class SlaveEnd(AnsweringEnd):
         self.station = station
 
     def next_command(self, what: str = '') -> Symbol:
-        """Wait for a good message to us; polls before it are answered DLE EOT."""
+        """Wait for a good message to us; polls before it get a kept reply, or DLE EOT."""
         def is_command(symbol: Symbol) -> bool:
             if symbol.kind is SymbolKind.POLL and symbol.station == self.station:
-                self.wire.send(codec.EOT)
+                if self._further:
+                    self.reply_to(self._further.popleft())
+                else:
+                    self.wire.send(codec.EOT)
             return symbol.kind is SymbolKind.MASTER_MESSAGE and symbol.station == self.station
 
         return self.hear_command(is_command, what)
@@ -435,12 +471,16 @@ class SlaveEnd(AnsweringEnd):
         self.next_poll()
         self.wire.send(raw)
 
-    def next_poll(self, what: str = 'a poll of our station') -> Symbol:
-        """Wait for a poll of our station; raise Failed for a message or a reset before it."""
-        def is_ours(symbol: Symbol) -> bool:
-            return symbol.station == self.station or symbol.kind is SymbolKind.NAK
+    def next_visit(self, what: str) -> Symbol:
+        """Wait for a poll of our station, a message to it, or a reset."""
+        return self.wire.until(lambda symbol: symbol.station == self.station
+                               or symbol.kind is SymbolKind.NAK, what, PATIENCE)
 
-        symbol = self.wire.until(is_ours, what, PATIENCE)
+    def next_poll(self, what: str = 'a poll of our station') -> Symbol:
+        """Wait for a poll of our station; raise Failed for the same message or a reset."""
+        symbol = self.next_visit(what)
+        while self.keeps(symbol):
+            symbol = self.next_visit(what)
         if symbol.kind is not SymbolKind.POLL or not symbol.is_good:
             raise Failed(what, str(symbol))
         return symbol
@@ -455,7 +495,20 @@ class ServerEnd(AnsweringEnd):
     """A full-duplex node that answers the commands of another node."""
 
     def next_command(self, what: str = '') -> Symbol:
-        return self.hear_command(lambda heard: heard.kind is SymbolKind.MESSAGE, what)
+        """Send a kept reply, and wait for a good message, which may come before the ACK."""
+        heard = set()
+
+        def is_command(symbol: Symbol) -> bool:
+            heard.add(symbol.kind)
+            return symbol.kind is SymbolKind.MESSAGE
+
+        is_owed = bool(self._further)
+        if is_owed:
+            self.reply_to(self._further.popleft())
+        command = self.hear_command(is_command, what)
+        if is_owed and SymbolKind.ACK not in heard:
+            self.wire.hear()
+        return command
 
     def say(self, raw: bytes) -> None:
         self.wire.send(raw)
@@ -466,7 +519,19 @@ class ServerEnd(AnsweringEnd):
 
 
 class RadioServerEnd(ServerEnd):
-    """A node of a radio modem network that answers the commands of another node."""
+    """A node of a radio modem network, ``station``, that answers the commands of another node."""
+
+    def __init__(self, wire: Wire, station: int, serve: Serve) -> None:
+        super().__init__(wire, serve)
+        self.station = station
+
+    def next_command(self, what: str = '') -> Symbol:
+        return self.hear_command(lambda heard: heard.kind is SymbolKind.MESSAGE
+                                 and not self.keeps(heard), what)
+
+    def keeps(self, symbol: Symbol) -> bool:
+        """Pass over commands to another station."""
+        return codec.is_command(symbol) and symbol.data[0] != self.station
 
     def acknowledge(self, command: Symbol) -> None:
         pass

@@ -16,6 +16,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from abdf1_ros.conform import codec
 from abdf1_ros.conform.case import case, Target
 from abdf1_ros.conform.codec import Symbol, SymbolKind
@@ -45,31 +47,45 @@ def polled_after_ack(end: SlaveEnd) -> None:
     end.finish(command)
 
 
+def _polled_again(end: SlaveEnd, answer: Callable[[Symbol], bytes], what: str) -> Symbol:
+    """
+    Give ``answer`` to the poll for a reply, and expect another poll; return the command.
+
+    A master with more than one command under way may send one first. Then the next is tried.
+    """
+    for _ in range(_COMMANDS):
+        command = end.next_command()
+        end.wire.send(codec.ACK)
+        end.next_poll()
+        end.wire.send(answer(command))
+        symbol = end.wire.hear(PATIENCE)
+        if symbol is not None and symbol.station not in (None, end.station):
+            symbol = end.next_visit(what)
+        if symbol is not None and symbol.kind is SymbolKind.POLL and symbol.is_good:
+            return command
+        if symbol is None or not end.keeps(symbol):
+            break
+        end.next_poll()
+        end.reply_and_hear(command)
+    raise Failed(what, str(symbol or 'silence'))
+
+
 @case('After DLE EOT the master polls again for a reply that is due.', 'M 3-13 to 3-15', _MASTER)
 def eot_polled_again(end: SlaveEnd) -> None:
-    command = end.next_command()
-    end.wire.send(codec.ACK)
-    end.next_poll()
-    end.wire.send(codec.EOT)
-    end.next_poll('another poll after DLE EOT')
+    command = _polled_again(end, lambda command: codec.EOT, 'another poll after DLE EOT')
     end.reply_and_hear(command)
 
 
 @case('A reply with a wrong check is asked for by another poll; DLE NAK would reset the whole '
       'line.', 'M 3-14, 2-7', _MASTER)
 def bad_reply_polled_again(end: SlaveEnd) -> None:
-    command = end.next_command()
-    end.wire.send(codec.ACK)
-    end.next_poll()
-    frame = codec.message(end.serve(command.data), end.wire.check)
-    for damaged in codec.all_damaged(frame, end.wire.check):
-        end.wire.send(damaged)
-        symbol = end.wire.hear(PATIENCE)
-        if symbol is not None and symbol.kind is not SymbolKind.POLL:
-            raise Failed('another poll', str(symbol))
-        if symbol is None or symbol.station != end.station:
-            end.next_poll('another poll of this station')
-    end.reply_and_hear(command, 'DLE ACK for the good reply')
+    for at in range(codec.CHECK_SIZES[end.wire.check]):
+        def damaged(command: Symbol, at: int = at) -> bytes:
+            frame = codec.message(end.serve(command.data), end.wire.check)
+            return codec.all_damaged(frame, end.wire.check)[at]
+
+        command = _polled_again(end, damaged, 'another poll')
+        end.reply_and_hear(command, 'DLE ACK for the good reply')
 
 
 @case('DLE NAK resets the whole line: a master does not send it with each command.',
@@ -88,8 +104,7 @@ def no_needless_reset(end: SlaveEnd) -> None:
 def duplicate_acknowledged(end: SlaveEnd) -> None:
     command = end.next_command()
     end.finish(command)
-    visit = end.wire.until(lambda symbol: symbol.station == end.station, 'a poll or a command',
-                           PATIENCE)
+    visit = end.next_visit('a poll or a command')
     if visit.kind is SymbolKind.MASTER_MESSAGE:
         end.wire.send(codec.ACK)
         end.next_poll()

@@ -118,7 +118,7 @@ def own_packet_dropped(end: RadioEnd) -> None:
 
 def _next_alone(end: RadioServerEnd, last: Symbol) -> None:
     """Expect a new command, and nothing before it; answer it."""
-    symbol = end.wire.expect(SymbolKind.MESSAGE, 'no symbol before the next command', PATIENCE)
+    symbol = end.expect(SymbolKind.MESSAGE, 'no symbol before the next command', PATIENCE)
     if symbol.data[4:6] == last.data[4:6]:
         raise Failed('a new command: this one has its reply', symbol.data.hex(' '))
     end.finish(symbol)
@@ -134,7 +134,7 @@ def reply_taken(end: RadioServerEnd) -> None:
 @case('A command without a reply gets no DLE ENQ. Sent again, it is as it was.', _RULES, _SENDER)
 def silence_not_enquired(end: RadioServerEnd) -> None:
     first = end.next_command()
-    second = end.wire.expect(SymbolKind.MESSAGE, 'no symbol before the next message', PATIENCE)
+    second = end.expect(SymbolKind.MESSAGE, 'no symbol before the next message', PATIENCE)
     if second.data[4:6] == first.data[4:6]:
         expect_same(first.data, second.data)
     end.finish(second)
@@ -144,11 +144,12 @@ def _not_taken(end: RadioServerEnd, command: Symbol, *frames: bytes) -> None:
     """
     Send frames before the reply to a command, then the reply.
 
-    Before the reply the target may only forward frames that have the SRC of another node.
+    Before the reply the target may only forward frames that have the SRC of another node, and ask
+    another station.
     """
     for frame in frames:
         end.wire.send(frame)
-    while (symbol := end.wire.hear(_MOMENT)) is not None:
+    while (symbol := end.hear(_MOMENT)) is not None:
         if symbol.raw not in frames or symbol.data[1] == command.data[1]:
             raise Failed('silence: the reply has not come', str(symbol))
     end.finish(command)

@@ -48,6 +48,13 @@ class RawLine(Protocol):
         """Send bytes."""
 
 
+class Hear(Protocol):
+    """Hears as ``Wire.hear`` does."""
+
+    def __call__(self, within: float | None, *, answers: bool) -> Symbol | None:
+        """Return the next symbol; None if no symbol begins within ``within`` s."""
+
+
 @dataclass(frozen=True, slots=True)
 class Sent:
     """Bytes that we have sent, and the time (s)."""
@@ -225,10 +232,11 @@ class Wire:
         self._embedded.append(symbol)
         return self._embedded.popleft()
 
-    def expect(self, kind: SymbolKind, what: str = '', within: float | None = None) -> Symbol:
+    def expect(self, kind: SymbolKind, what: str = '', within: float | None = None,
+               hear: Hear | None = None) -> Symbol:
         """Return the next symbol if it is of ``kind`` and good, else raise Failed."""
         expected, noise = what or kind.value, self.noise
-        symbol = self.hear(within, answers=kind is not SymbolKind.ENQ)
+        symbol = (hear or self.hear)(within, answers=kind is not SymbolKind.ENQ)
         if symbol is None:
             raise Failed(expected, 'silence' if noise == self.noise else SymbolKind.NOISE.value)
         if symbol.kind is not kind or not symbol.is_good:

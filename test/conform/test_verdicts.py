@@ -232,12 +232,14 @@ ALLOWED = [(target, habit, names) for targets, habit, names in [
     ((Target.MASTER,), Habit.POLLS_BETWEEN_REPETITIONS, set()),
     ((Target.MASTER,), Habit.POLLS_OTHERS, set()),
     ((Target.MASTER,), Habit.POLLS_LATE, set()),
+    ((Target.MASTER,), Habit.SENDS_TWO, {'other-reply-ignored'}),
+    ((Target.MASTER,), Habit.ONE_REPETITION, set()),
     (RADIO, Habit.REPEATS_REPLY, set()),
     (RADIO, Habit.COUNTS_NOTHING, {'duplicate-executed-once'}),
     (RADIO, Habit.SENDS_ON, set()),
     (SENDER, Habit.NO_REPETITION, set()),
     (SENDER, Habit.NEVER_GIVES_UP, {'repetitions-limited'}),  # in the time that a case has
-    (SENDER, Habit.SENDS_ON, set()),
+    (SENDER, Habit.SENDS_ON, set()), (SENDER, Habit.POLLS_OTHERS, set()),
 ] for target in targets]
 
 NOT_HERE = {'address-forms', 'address-forms-agree', 'poll-stuffing'}  # for a PLC-5, for station 16

@@ -67,7 +67,7 @@ def results_of(line: TimedLine, target: Target, check: str, family: str = 'SLC',
         Target.MASTER: lambda: SlaveEnd(wire, station, serve),
         Target.CLIENT: lambda: ServerEnd(wire, serve),
         Target.RADIO: lambda: RadioEnd(wire, station, 5, 0x2000, words),
-        Target.RADIO_CLIENT: lambda: RadioServerEnd(wire, serve)}
+        Target.RADIO_CLIENT: lambda: RadioServerEnd(wire, station, serve)}
     cases = [case for case in CASES if target in case.targets and only in ('', case.name)]
     return list(run_cases(cases, wire, ends[target](), frozenset(Permission)))
 

@@ -97,7 +97,7 @@ Habit = Enum('Habit', [
     # Of a master or client.
     'SAME_TNS', 'NEW_TNS_FOR_REPETITION', 'STS_IN_COMMAND', 'POLL_WITH_CRC', 'DOES_NOT_POLL',
     'EOT_ENDS_COMMAND', 'NAKS_BAD_REPLY', 'IMPATIENT', 'POLLS_BETWEEN_REPETITIONS', 'POLLS_OTHERS',
-    'POLLS_LATE',
+    'POLLS_LATE', 'SENDS_TWO', 'ONE_REPETITION',
     'ACKS_BAD_REPLY',  # and polls again
     'NAK_BEFORE_COMMAND', 'TAKES_ANY_TNS', 'TAKES_ANY_DESTINATION', 'REPEATS_FOR_EVER',
     'STOPS_AFTER_10',  # commands
@@ -859,6 +859,8 @@ class MutatedRadioClient(_Radio):
             return self._ask()
         self._tries += 1
         self.say(self.frame(self._command))
+        if self.has(Habit.POLLS_OTHERS):
+            self.say(self.frame(b'\7' + self._command[1:5] + b'\x99' + self._command[6:]), 0.2)
         if self.has(Habit.REPEATS_CUT):
             self._command = self._command[:-1]
         if self.has(Habit.SILENCE_REPEATED):
@@ -904,7 +906,10 @@ class MutatedMaster(Wire):
             if self.has(Habit.NAK_BEFORE_COMMAND):
                 self.say(bytes((_DLE, _NAK)))
             if (yield from self._delivered(command)):
+                further = self._asker.next_command() if self.has(Habit.SENDS_TWO) else b''
+                yield from self._delivered(further) if further else ()
                 yield from self._fetched(command)
+                yield from self._fetched(further) if further else ()
             yield 0.05
 
     def _delivered(self, command: bytes) -> Generator[float, Symbol | None, bool]:
@@ -936,7 +941,7 @@ class MutatedMaster(Wire):
             return
         if self.has(Habit.POLLS_LATE):
             yield 0.2
-        while self.now < end and silent <= _LIMIT:
+        while self.now < end and silent <= (1 if self.has(Habit.ONE_REPETITION) else _LIMIT):
             self._poll()
             symbol = yield 0.02 if self.has(Habit.IMPATIENT) else _ACK_TIMEOUT
             if symbol == (_EOT,):
