@@ -110,8 +110,7 @@ def bad_reply_not_used(end: ServerEnd) -> None:
 
 @case('A message that never gets a response is given up after some DLE ENQ.', 'M 4-5', _CLIENT)
 def enquiry_limit(end: ServerEnd) -> None:
-    end.next_command()
-    expect_end_of_enquiries(end.wire, PATIENCE)
+    expect_end_of_enquiries(end.wire, PATIENCE, end.next_command().data)
 
 
 def _expect_ack(end: ServerEnd, what: str) -> None:

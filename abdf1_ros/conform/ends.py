@@ -55,18 +55,19 @@ def expect_end_of_naks(wire: Wire, message: bytes, patience: float) -> None:
                  'highest limit of the products', 'the message once more')
 
 
-def expect_end_of_enquiries(wire: Wire, patience: float) -> Symbol | None:
+def expect_end_of_enquiries(wire: Wire, patience: float,
+                            message: bytes | None = None) -> Symbol | None:
     """
-    Leave each DLE ENQ without an answer; return the next other symbol, None for silence.
+    Leave DLE ENQ and ``message`` without an answer; return the next other symbol, None for none.
 
-    Raises Failed if the target does not stop sending DLE ENQ.
+    Raises Failed if the target does not stop sending them.
     """
     for _ in range(HIGHEST_LIMIT + 1):
         symbol = wire.hear(patience, answers=False)
-        if symbol is None or symbol.kind is not SymbolKind.ENQ:
+        if symbol is None or symbol.kind is not SymbolKind.ENQ and symbol.data != message:
             return symbol
     raise Failed(f'an end after {HIGHEST_LIMIT} DLE ENQ at the latest, the highest limit of the '
-                 'products', 'DLE ENQ once more')
+                 'products', f'{symbol} once more')
 
 
 MOST_TRIES = 3  # tries to send to a full sink, and to answer a command before a case

@@ -91,6 +91,7 @@ FAULTS = [(target, habit, name) for targets, habit, name in [
     ((Target.PEER,), Habit.EMBEDDED_NAK_IGNORED, 'embedded-nak'),
     ((Target.PEER,), Habit.EMBEDDED_NAK_AS_ACK, 'embedded-nak'),
     ((Target.PEER, Target.CLIENT), Habit.ENQUIRES_FOR_EVER, 'enquiry-limit'),
+    ((Target.PEER, Target.CLIENT), Habit.NEVER_GIVES_UP, 'enquiry-limit'),
     ((Target.PEER,), Habit.REPEATS_AFTER_ACK, 'no-needless-enquiry'),
     ((Target.CLIENT,), Habit.USES_REFUSED_REPLY, 'bad-reply-not-used'),
     ((Target.CLIENT, Target.MASTER), Habit.TAKES_ANY_REPLY, 'other-reply-ignored'),

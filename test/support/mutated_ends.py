@@ -630,7 +630,8 @@ class _FullDuplex(Wire):
                 Habit.NEVER_GIVES_UP, Habit.ENQUIRES_FOR_EVER}:
             self._end(is_taken=False)
         else:
-            is_repeated = self.has(Habit.SILENCE_REPEATED)
+            is_repeated = self.has(Habit.SILENCE_REPEATED) or \
+                self.has(Habit.NEVER_GIVES_UP) and self._enquiries % 2 == 0
             self.say(self.frame(self._outgoing[0]) if is_repeated else bytes((_DLE, _ENQ)))
             self._wait()
 
@@ -729,7 +730,8 @@ class MutatedClient(_FullDuplex):
     def _ask(self) -> None:
         self._command = self._asker.next_command()
         if self._command:
-            self.then(1e6 if self.has(Habit.ENQUIRES_FOR_EVER) else _COMMAND_TIMEOUT, self._ask)
+            self.then(1e6 if self.habits & {Habit.ENQUIRES_FOR_EVER, Habit.NEVER_GIVES_UP}
+                      else _COMMAND_TIMEOUT, self._ask)
             self._outgoing.clear()
             self.send(self._command)
 
