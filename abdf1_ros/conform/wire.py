@@ -115,6 +115,7 @@ class Wire:
         self.begun = clock()
         self._char_time = char_time
         self._buffer = b''
+        self._symbol_begun = 0.0
         self._embedded: deque[Symbol] = deque()
         self._sent_until = 0.0
         self._response = codec.NAK
@@ -167,11 +168,11 @@ class Wire:
 
         With ``answers`` a DLE ENQ gets the last response, and is not returned (M 4-5, 4-13).
         """
-        begun = max(self._clock(), self._sent_until)
-        end = begun + (self.answer_time if within is None else within)
-        symbol = self._next(begun, end)
+        end = max(self._clock(), self._sent_until) + (
+            self.answer_time if within is None else within)
+        symbol = self._next(end)
         while symbol is not None and self._has_passed(symbol, answers):
-            symbol = self._next(begun, end) if self._clock() < end else None
+            symbol = self._next(end) if self._clock() < end else None
         return symbol
 
     def _has_passed(self, symbol: Symbol, answers: bool) -> bool:
@@ -198,7 +199,7 @@ class Wire:
             self.send(codec.ACK)
         return True
 
-    def _next(self, begun: float, end: float) -> Symbol | None:
+    def _next(self, end: float) -> Symbol | None:
         if self._embedded:
             return self._embedded.popleft()
         while True:
@@ -207,7 +208,7 @@ class Wire:
                 return self._take(symbol)
             # Wait for the end of a symbol that has begun, but not for ever.
             longest = max(_FRAME_TIME, _LONGEST_FRAME * self._char_time)
-            limit = max(end, begun + longest) if self._buffer else end
+            limit = max(end, self._symbol_begun + longest) if self._buffer else end
             left = limit - self._clock()
             if left <= 0:
                 noise = Symbol(SymbolKind.NOISE, self._buffer)
@@ -217,11 +218,14 @@ class Wire:
     def _read(self, timeout: float) -> None:
         data = self._line.read(min(timeout, self._time_left()))
         self.has_heard = self.has_heard or bool(data)
+        if not self._buffer:
+            self._symbol_begun = self._clock()
         self._buffer = (self._buffer + data)[-_MOST_UNREAD:]
 
     def _take(self, symbol: Symbol) -> Symbol:
         symbol = replace(symbol, at=self._clock())
         self._buffer = self._buffer[len(symbol.raw):]
+        self._symbol_begun = symbol.at
         self.transcript.append(symbol)
         if symbol.kind is SymbolKind.MESSAGE:
             self._response = codec.NAK  # until we send its response

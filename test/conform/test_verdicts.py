@@ -522,6 +522,14 @@ def test_silence_counts_from_the_last_byte_that_was_sent() -> None:
     assert line.now == pytest.approx(2.0)
 
 
+def test_symbol_that_begins_late_is_heard_to_its_end() -> None:
+    line, frame = Babble(), codec.message(bytes(6), BlockCheck.CRC)
+    wire = Wire(line, BlockCheck.CRC, line.clock, is_half_duplex=False)
+    parts, wait = [frame[8:], frame[4:8], frame[:4], *[b''] * 12], line.read
+    line.read = lambda timeout: wait(timeout) + parts.pop()  # type: ignore[method-assign]
+    assert (symbol := wire.hear(4.0)) is not None and symbol.raw == frame
+
+
 # M 5-4 and 5-5: DST 08 ... with a byte 10, which is doubled; to station 20 (hex) as a master.
 LINK_DATA = bytes.fromhex('08 09 06 00 10 04 03')
 
