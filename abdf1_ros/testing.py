@@ -205,7 +205,7 @@ class Plcs:
     """
 
     def __init__(self, data: Path, ladders: Sequence[int] = ()) -> None:
-        self._plcs = load_plcs(str(data), Checksum.CRC, time.monotonic, threading.Lock)
+        self._plcs = load_plcs(str(data), Checksum.CRC, time.monotonic, threading.RLock)
         for station in ladders:
             self[station].run_ladder(Ladder(self[station].table))
         self._line = PtyEndpoint(str(data.with_name('plcs')))
@@ -252,8 +252,9 @@ class Plcs:
             if not -0x8000 <= word <= 0xFFFF:
                 raise ValueError(f'{word} is not a word, from -32768 to 65535')
         table = self[station].table
-        table.write(parse_address(address, table.plc_type),
-                    b''.join((word & 0xFFFF).to_bytes(2, 'little') for word in words))
+        with self[station].lock:
+            table.write(parse_address(address, table.plc_type),
+                        b''.join((word & 0xFFFF).to_bytes(2, 'little') for word in words))
 
 
 class SimulatedCell:

@@ -258,7 +258,7 @@ def _load(options: argparse.Namespace,
     what its ladder program reports.
     """
     plcs = load_plcs(options.data or str(config_file('simulator.csv')),
-                     Checksum(options.check), time.monotonic, threading.Lock)
+                     Checksum(options.check), time.monotonic, threading.RLock)
     if options.full_duplex is not None:
         plcs = [_plc('--full-duplex', options.full_duplex, plcs)]
         plcs[0].be_full_duplex()

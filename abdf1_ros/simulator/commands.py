@@ -96,6 +96,12 @@ def execute(line: str, plcs: Sequence[SimulatedPlc],
     """
     verb, *words = line.split()
     plc, arguments = _station(words, plcs)
+    with plc.lock:
+        return _carry_out(line, verb, plc, arguments, report)
+
+
+def _carry_out(line: str, verb: str, plc: SimulatedPlc, arguments: list[str],
+               report: Callable[[str], None]) -> str:
     if verb == 'msg' and plc.processor.is_full_duplex and len(arguments) > 1:
         return _send(plc, arguments[0], arguments[1:], report)
     if verb == 'mode' and len(arguments) == 1:

@@ -150,8 +150,8 @@ class SimulatedPlc(TaskSource):
     """
     One station with its data table; ``clock`` gives seconds.
 
-    ``via``: the number of its gateway. ``lock``: locked while its program advances, because
-    several threads may advance it.
+    ``via``: the number of its gateway. ``lock``: a reentrant lock, locked while its program
+    advances, or a command is carried out, because several threads may do so.
     """
 
     def __init__(self, station: int, table: DataTable, checksum: Checksum,
@@ -199,10 +199,11 @@ class SimulatedPlc(TaskSource):
         if self.faults.silent or (self.faults.full and isinstance(symbol, Frame)):
             return b''
         is_poll = isinstance(symbol, Poll) and symbol.valid and symbol.station == self.station
-        if is_poll and (self._polls_to_refuse > 0 or self.clock() < self._ready):
-            self._polls_to_refuse = max(0, self._polls_to_refuse - 1)
-            return self.damaged(frames.EOT)
-        return self.damaged(self.slave.handle(symbol))
+        with self.lock:
+            if is_poll and (self._polls_to_refuse > 0 or self.clock() < self._ready):
+                self._polls_to_refuse = max(0, self._polls_to_refuse - 1)
+                return self.damaged(frames.EOT)
+            return self.damaged(self.slave.handle(symbol))
 
     @property
     def is_running(self) -> bool:
@@ -253,9 +254,9 @@ class SimulatedPlc(TaskSource):
 
     def advance(self) -> None:
         """Make all changes that are due by now, while the program runs."""
-        if not self.is_running:
-            return
         with self.lock:
+            if not self.is_running:
+                return
             now = self.clock()
             for mover in self._movers:
                 mover.advance(self.table, now)
@@ -303,7 +304,8 @@ class SimulatedPlc(TaskSource):
         if self.faults.status:
             sts, *ext_sts = self.faults.status
             return command.reply(bytes(ext_sts), sts)
-        return self._server.serve(command)
+        with self.lock:
+            return self._server.serve(command)
 
 
 def load_plcs(path: str, checksum: Checksum, clock: Callable[[], float],

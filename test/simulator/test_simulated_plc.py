@@ -16,7 +16,7 @@
 
 import math
 from pathlib import Path
-from unittest.mock import Mock
+from unittest.mock import MagicMock, Mock
 
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
@@ -578,8 +578,10 @@ def test_download_power_and_reset() -> None:
     with pytest.raises(CommandError, match='no ladder; start with --ladder 1'):
         execute('reset 1', [plc])
     plc.run_ladder(Ladder(plc.table))
+    plc.lock = lock = MagicMock()
     for verb in ('reset', 'power', 'download'):
         assert execute(f'{verb} 1', [plc]) == f'station 1: {verb}'
+        assert lock.__enter__.called  # the thread of the link may be in the program
     assert plc.processor.setting is Setting.PROGRAM
 
 
