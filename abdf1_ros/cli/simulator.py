@@ -24,7 +24,7 @@ switch faults on and off.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from functools import partial
 import math
 from operator import itemgetter
@@ -123,6 +123,22 @@ class _FaultyPort(PortAround):
         """Send bytes, damaged if the PLC is noisy; a silent PLC sends nothing."""
         if not self._plc.faults.silent:
             self._port.write(self._plc.damaged(data))
+
+
+class _Hearing(Collection[int]):
+    """The stations of the PLCs that are not silent now."""
+
+    def __init__(self, plcs: Sequence[SimulatedPlc]) -> None:
+        self._plcs = plcs
+
+    def __iter__(self) -> Iterator[int]:
+        return (plc.station for plc in self._plcs if not plc.faults.silent)
+
+    def __contains__(self, station: object) -> bool:
+        return station in list(self)
+
+    def __len__(self) -> int:
+        return len(list(self))
 
 
 class _EchoingPort(PortAround):
@@ -410,12 +426,10 @@ def _radio(plcs: Sequence[SimulatedPlc], checksum: Checksum, timing: LineTiming)
                    if command.dst in (plc.station, BROADCAST) and not plc.faults.silent]
         return replies[0] if replies else None
 
-    first, *others = plcs
-    settings = LinkSettings(
-        station=first.station, checksum=checksum, also=[plc.station for plc in others])
+    settings = LinkSettings(station=None, checksum=checksum, also=_Hearing(plcs))
     return Machine(
-        lambda machine: RadioNode(machine, settings, ActiveStationList(), serve).run(first),
-        checksum=checksum, duplex=Duplex.RADIO, timing=timing, counters=first.counters)
+        lambda machine: RadioNode(machine, settings, ActiveStationList(), serve).run(plcs[0]),
+        checksum=checksum, duplex=Duplex.RADIO, timing=timing, counters=plcs[0].counters)
 
 
 def _converse(cast: Cast, script: TimedCommands, options: argparse.Namespace,

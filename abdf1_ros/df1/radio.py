@@ -133,7 +133,6 @@ class RadioNode(EqualNode):
                  report: Callable[[Event], None] = lambda event: None) -> None:
         super().__init__(machine, stations, serve, report, settings.station)
         self._settings = settings
-        self._numbers = {settings.station, *settings.also}
         self._most_under_way = RADIO.most_under_way(settings)
         # Seconds within which a node of these settings repeats a command.
         self._repetition_time = (settings.nak_retries + 1) * (
@@ -141,6 +140,10 @@ class RadioNode(EqualNode):
         self._random = Random(settings.seed)
         self._same_number: float | None = None
         self._forget()
+
+    @property
+    def _numbers(self) -> set[int | None]:
+        return {self._settings.station, *self._settings.also}
 
     def status(self) -> LinkState:
         """Return when another node with our number was heard."""

@@ -108,7 +108,9 @@ class LinkSettings(LinkOptions):
     """A radio modem node forwards packets between these nodes; 255 stands for broadcasts."""
 
     also: Collection[int] = ()
-    """Further numbers of a radio modem node, which may simulate several PLCs."""
+    """
+    Further numbers of a radio modem node, which may simulate several PLCs. They may change.
+    """
 
     avoids_collisions: bool = False
     """The radios wait for a quiet line and buffer both directions, so we need not wait."""

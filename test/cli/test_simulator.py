@@ -329,13 +329,16 @@ def test_outage_is_told_once_and_faults_of_a_full_duplex_plc_are_those_of_its_li
 def test_broadcast_by_radio_reaches_every_plc(
         monkeypatch: pytest.MonkeyPatch, data: Path) -> None:
     monkeypatch.setattr('abdf1_ros.cli.simulator.LinkThread', links := Mock())
-    Cast(parse_options(['--data', str(data), '--radio'])).close()
+    cast = Cast(parse_options(['--data', str(data), '--radio']))
+    cast.close()
     line = ScriptedLine(links.call_args.args[0])
     write, read, reply = (frames.message_frame(bytes.fromhex(text), Checksum.CRC) for text in (
         'ff 05 0f 00 11 02 aa 02 07 89 00 00 2a 00', SLC_READ, '05 02 4f 00 10 02 2a 00 fe ff'))
     line.write(write)
-    line.write(read)
-    assert line.read(1.0) == reply
+    for fault, heard in (('silent 2', b''), ('normal 2', reply)):  # a silent PLC executes nothing
+        cast.carry_out(fault)
+        line.write(read)
+        assert line.read(1.0) == heard
 
 
 def test_lamps_of_a_ladder_are_told_though_no_command_comes(
