@@ -212,7 +212,9 @@ class Cast:
         self._on_lamp = on_lamp
         self._plcs = _load(options, self._tell_lamp)
         self._line = _make_line(options)
-        self._link = _make_thread(self._plcs, self._line, options, self._tell)
+        self._make_machine = partial(_make_machine, self._plcs, options)
+        self._link = _make_thread(
+            self._make_machine(), self._plcs, self._line, options, self._tell)
         self._check = options.check
 
     def _tell(self, text: str) -> None:
@@ -235,6 +237,10 @@ class Cast:
             self.say(execute(line, self._plcs, self.say))
         except CommandError as error:
             self.say(str(error))
+        else:
+            if line.split()[0] == 'power' and self._plcs[0].processor.is_full_duplex:
+                self._link.exchange(self._make_machine(), lambda: None, reopen=False,
+                                    reason='the power was off')
         self._link.wake()
 
     def advance(self) -> None:
@@ -300,23 +306,26 @@ def _plc(option: str, station: str, plcs: Sequence[SimulatedPlc]) -> SimulatedPl
     raise ValueError(f'{option}: name a station ({known})')
 
 
-def _make_thread(plcs: Sequence[SimulatedPlc], line: Endpoint,
-                 options: argparse.Namespace, say: Callable[[str], None]) -> LinkThread:
-    """Return the thread that answers for ``plcs`` on ``line``."""
+def _make_machine(plcs: Sequence[SimulatedPlc], options: argparse.Namespace) -> Machine:
+    """Return a machine that answers for ``plcs``."""
     checksum = Checksum(options.check)
-    is_full_duplex = options.full_duplex is not None
     # Timers depend on the speed of the line, and only a serial port has a real speed.
     timing = Network(baud=options.baud).timing if options.port else LineTiming()
-    if is_full_duplex:
-        machine = _full_duplex(plcs[0], checksum, timing)
-    elif options.radio:
-        machine = _radio(plcs, checksum, timing)
-    else:
-        machine = Machine(multidrop(stations_of(plcs, checksum)), checksum=checksum)
+    if options.full_duplex is not None:
+        return _full_duplex(plcs[0], checksum, timing)
+    if options.radio:
+        return _radio(plcs, checksum, timing)
+    return Machine(multidrop(stations_of(plcs, checksum)), checksum=checksum)
 
+
+def _make_thread(machine: Machine, plcs: Sequence[SimulatedPlc], line: Endpoint,
+                 options: argparse.Namespace, say: Callable[[str], None]) -> LinkThread:
+    """Return the thread that runs ``machine`` on ``line``."""
     def open_line() -> Port:
         port: Port = _EchoingPort(line.open()) if options.echo else line.open()
-        return _FaultyPort(port, plcs[0], checksum) if is_full_duplex else port
+        if options.full_duplex is None:
+            return port
+        return _FaultyPort(port, plcs[0], Checksum(options.check))
 
     return LinkThread(
         machine, open_line, on_state=_announcer(say),

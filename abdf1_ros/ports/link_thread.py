@@ -71,7 +71,9 @@ _GLANCE = 0.1
 class _Exchange:
     """The next machine of a line; ``is_done`` is set when it has replaced the last machine."""
 
-    def __init__(self, machine: Machine, while_sending: Callable[[], None], reopen: bool) -> None:
+    def __init__(self, machine: Machine, while_sending: Callable[[], None], reopen: bool,
+                 reason: str) -> None:
+        self.reason = reason
         self.machine = machine
         self.while_sending = while_sending
         self.reopen = reopen
@@ -202,14 +204,15 @@ class LinkThread(threading.Thread):
         self.wake()
 
     def exchange(self, machine: Machine, while_sending: Callable[[], None],
-                 reopen: bool) -> bool:
+                 reopen: bool, reason: str = _READ_AGAIN) -> bool:
         """
         Go on with another machine, on the same port, or with ``reopen`` on a newly opened port.
 
-        Return True if the machine is on the line within about 5 s. If not, the exchange is
-        cancelled. Called from one thread only.
+        Commands under way end with an error that tells the ``reason``. Return True if the machine
+        is on the line within about 5 s. If not, the exchange is cancelled. Called from one thread
+        only.
         """
-        exchange = _Exchange(machine, while_sending, reopen)
+        exchange = _Exchange(machine, while_sending, reopen, reason)
         self._next = exchange
         self.wake()
         return self._has_happened(exchange.is_done) or (
@@ -286,7 +289,7 @@ class LinkThread(threading.Thread):
         self.has_turned = True
         exchange, self._next = self._next, None
         if exchange is not None and exchange.claim():
-            self._machine.stop(PortLost(_READ_AGAIN))
+            self._machine.stop(PortLost(exchange.reason))
             self._while_sending()
             self._machine, self._while_sending = exchange.machine, exchange.while_sending
             exchange.is_done.set()

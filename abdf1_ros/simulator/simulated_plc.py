@@ -162,7 +162,10 @@ class SimulatedPlc(TaskSource):
         self.via = via
         self.is_radio = False
         self.table = table
-        self.faults = InjectedFaults()
+        self._polls_to_refuse = 0
+        # clock value (s) from which the reply to the last command is ready
+        self._ready = -math.inf
+        self._faults = InjectedFaults()
         self.processor = processor or EmulatedProcessor()
         self.slave = HalfDuplexSlave(LinkSettings(station=station, checksum=checksum), self.serve)
         self.counters = self.slave.counters  # of our port
@@ -175,9 +178,15 @@ class SimulatedPlc(TaskSource):
         self.ladder: Ladder | None = None
         self.lock = lock
         self._saved: DataTable | None = None
-        self._polls_to_refuse = 0
-        # clock value (s) from which the reply to the last command is ready
-        self._ready = -math.inf
+
+    @property
+    def faults(self) -> InjectedFaults:
+        """Return the present faults; others take effect at once."""
+        return self._faults
+
+    @faults.setter
+    def faults(self, faults: InjectedFaults) -> None:
+        self._faults, self._polls_to_refuse, self._ready = faults, 0, -math.inf
 
     def be_full_duplex(self) -> None:
         """Answer from now on as a PLC with a full-duplex port."""

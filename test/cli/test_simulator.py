@@ -324,6 +324,8 @@ def test_outage_is_told_once_and_faults_of_a_full_duplex_plc_are_those_of_its_li
         port.write(b'x')
     first, second = (call.args[0] for call in line.write.call_args_list)  # a silent PLC sends none
     assert first == b'x' != second
+    cast.carry_out('power 1')  # waiting replies are lost
+    links.return_value.exchange.assert_called_once()
 
 
 def test_broadcast_by_radio_reaches_every_plc(

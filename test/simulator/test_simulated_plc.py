@@ -345,6 +345,9 @@ def test_plc_with_a_delay_replies_when_it_is_over(plc: SimulatedPlc, clock: Cloc
         assert master.poll().startswith(frames.STX)
         plc.handle(ACKNOWLEDGED)
         assert master.poll() == frames.EOT
+    master.deliver(READ)
+    plc.faults = InjectedFaults()
+    assert master.poll().startswith(frames.STX)
 
 
 def _with_ladder() -> tuple[Clock, SimulatedPlc]:
