@@ -100,8 +100,8 @@ _ANSWER_TIME = number_option('a number of seconds above 0, up to 30', math.ulp(0
 _MOST_WORDS = 41  # of one command to the smallest processors (M 7-17)
 
 _EPILOG = """\
-exit status: 0 if no case failed, 1 if a case failed, no case was tried, no byte was heard or the
-             port cannot be opened, 2 for bad options or files, 130 after Ctrl-C
+exit status: 0 if no case failed, 1 if a case failed, no case was tried, no byte was heard, or the
+             line was lost or cannot be opened, 2 for bad options or files, 130 after Ctrl-C
 
 examples:
   conform slave --port /dev/ttyUSB0 --baud 19200 --station 1 --family SLC
@@ -188,24 +188,15 @@ def _run(options: argparse.Namespace, target: Target, cases: Sequence[Case],
 def _judge(options: argparse.Namespace, target: Target, cases: Sequence[Case], wire: Wire,
            network: Network, end: End) -> int:
     results: list[CaseResult] = []
-    identity = _identity(end) if isinstance(end, AskingEnd) else None
-    for result in run_cases(cases, wire, end, _allowed(options)):
-        results.append(result)
-        if not (options.json or options.report):
-            print(line_of(result), flush=True)
-    # Facts that may be published. The name of the port is left out: it may contain a host's name.
-    kind = 'TCP' if options.tcp else 'pty' if options.pty else (
-        network.port.partition('://')[0] if '://' in network.port else 'serial')
-    facts = {'target': target.value, 'processor': str(identity or 'not known'),
-             'station': str(options.station), 'check': wire.check.value, 'port': kind,
-             'baud': str(network.baud), 'parity': network.parity,
-             'answer time': f'{options.answer_time:g} s', 'abdf1_ros': package_version()}
-    if options.json:
-        print(as_json(facts, results))
-    elif options.report:
-        print(as_issue(facts, results))
-    else:
-        print(summary_of(results))
+    identity = None
+    try:
+        identity = _identity(end) if isinstance(end, AskingEnd) else None
+        for result in run_cases(cases, wire, end, _allowed(options)):
+            results.append(result)
+            if not (options.json or options.report):
+                print(line_of(result), flush=True)
+    finally:  # also of a run that Ctrl-C or the loss of the line ends
+        _tell_results(options, results, identity, wire, network)
     if wire.noise:
         tell('conform', f'{wire.noise} bytes outside of any symbol were ignored: noise, or a '
              'wrong speed or parity?')
@@ -223,6 +214,26 @@ def _judge(options: argparse.Namespace, target: Target, cases: Sequence[Case], w
              f'--answer-time {options.answer_time:g} that may look like a fault: try '
              f'--answer-time {wire.enquired_after / _NEAR:.1g}')
     return EXIT_FAILED
+
+
+def _tell_results(options: argparse.Namespace, results: Sequence[CaseResult],
+                  identity: Identity | None, wire: Wire, network: Network) -> None:
+    """Print the results as the options say."""
+    # Facts that may be published. The name of the port is left out: it may contain a host's name.
+    # What an identity has in brackets is a part of the status, which may name the program.
+    processor = str(identity or 'not known').partition(' (')[0]
+    kind = 'TCP' if options.tcp else 'pty' if options.pty else (
+        network.port.partition('://')[0] if '://' in network.port else 'serial')
+    facts = {'target': options.target, 'processor': processor,
+             'station': str(options.station), 'check': wire.check.value, 'port': kind,
+             'baud': str(network.baud), 'parity': network.parity,
+             'answer time': f'{options.answer_time:g} s', 'abdf1_ros': package_version()}
+    if options.json:
+        print(as_json(facts, results))
+    elif options.report:
+        print(as_issue(facts, results))
+    else:
+        print(summary_of(results))
 
 
 def _identity(end: AskingEnd) -> Identity | None:

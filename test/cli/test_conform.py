@@ -145,8 +145,9 @@ def test_slave_behind_an_adapter_that_echoes(tmp_path: Path, capsys: Output) -> 
         assert main(options) == 1
         assert 'FAIL  poll-idle' in capsys.readouterr().out
     with running_simulator('--pty', port):
-        assert main([*options, '--echo']) == 1
-    assert 'leave out --echo' in capsys.readouterr().err
+        assert main([*options, '--echo', '--report']) == 1
+    said = capsys.readouterr()
+    assert 'leave out --echo' in said.err and '### Conformance run' in said.out
 
 
 def test_simulator_is_a_node_of_a_radio_network_and_not_a_peer(
