@@ -27,7 +27,7 @@ import argparse
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import replace
-import math
+from decimal import Context, ROUND_DOWN
 import random
 import re
 import time
@@ -72,6 +72,7 @@ from abdf1_ros.conform.ends import (
 from abdf1_ros.conform.report import as_issue, as_json, line_of, summary_of
 from abdf1_ros.conform.wire import Failed, Skipped, Wire
 from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import Damaged
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.stations import MAX_STATION
 from abdf1_ros.errors import FormatError
@@ -89,6 +90,7 @@ from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.simulated_plc import load_plcs
 
+_DOWN = Context(prec=1, rounding=ROUND_DOWN)
 _NEAR = 2.0  # in units of --answer-time: an earlier DLE ENQ may look like an answer
 
 _NOTHING_TRIED = 'no rule was tried: each case has its reason'
@@ -129,7 +131,8 @@ class _PortLine:
         if data[:size] != self._echo[:size]:
             raise OSError('our bytes do not come back unchanged; leave out --echo')
         self._echo = self._echo[size:]
-        return data[size:]
+        # A character that the UART has found damaged has to spoil its message (M 4-7).
+        return bytes(byte ^ isinstance(data, Damaged) for byte in data[size:])
 
     def write(self, data: bytes) -> None:
         self._port.write(data)
@@ -212,7 +215,7 @@ def _judge(options: argparse.Namespace, target: Target, cases: Sequence[Case], w
     if wire.enquired_after < _NEAR * options.answer_time:
         tell('conform', f'the target sends DLE ENQ after {wire.enquired_after:.2f} s; with '
              f'--answer-time {options.answer_time:g} that may look like a fault: try '
-             f'--answer-time {wire.enquired_after / _NEAR:.1g}')
+             f'--answer-time {_DOWN.create_decimal(wire.enquired_after / _NEAR + 1e-9):f}')
     return EXIT_FAILED
 
 
@@ -362,8 +365,10 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
                      f'{target.value}; --list shows them')
     if not 0 <= options.station <= MAX_STATION:
         parser.error(f'--station {options.station} should be from 0 to {MAX_STATION}')
-    if not 1 <= options.count <= _MOST_WORDS:
-        parser.error(f'--count {options.count} should be from 1 to {_MOST_WORDS}')
+    if not 1 <= options.count <= 100:
+        parser.error(f'--count {options.count} should be from 1 to 100')
+    if [options.pty, options.tcp, options.port].count(None) < 2:
+        parser.error('--pty, --tcp and --port: give one of them')
     if options.tcp is not None:
         try:
             options.tcp = host_and_port(options.tcp)

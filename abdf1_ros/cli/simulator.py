@@ -281,6 +281,8 @@ def _load(options: argparse.Namespace,
     """
     plcs = load_plcs(options.data or str(config_file('simulator.csv')),
                      Checksum(options.check), time.monotonic, threading.RLock)
+    if not plcs:
+        raise ValueError(f'{options.data}: has no stations')
     if options.full_duplex is not None:
         plcs = [_plc('--full-duplex', options.full_duplex, plcs)]
         plcs[0].be_full_duplex()

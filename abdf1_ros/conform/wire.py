@@ -256,7 +256,7 @@ class Wire:
     def until(self, is_wanted: Callable[[Symbol], bool], what: str,
               within: float) -> Symbol:
         """Return the first symbol that ``is_wanted``, whatever comes before it."""
-        end = self._clock() + within
+        end = max(self._clock(), self._sent_until) + within
         while (left := end - self._clock()) > 0:
             symbol = self.hear(left)
             if symbol is not None and is_wanted(symbol):

@@ -354,8 +354,11 @@ def _load_row(row: Row, plcs: dict[int, SimulatedPlc],
         raise Problem(row.where('PLC_Type'),
                       f'station {station} is a {plc.table.plc_type.value} already')
     if row.get('Processor'):
-        plc.processor.processor = _value(row, 'Processor', one_of({
+        processor = _value(row, 'Processor', one_of({
             entry.value: entry for entry in FAMILIES[plc_type].by_processor}))
+        if (before := plc.processor.processor) not in (None, processor):
+            raise Problem(row.where('Processor'), f'station {station} is {before.value} already')
+        plc.processor.processor = processor
     try:
         address, size = _place(row, plc_type)
         codec = _natural_codec(address, length or size)

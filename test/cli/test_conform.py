@@ -16,16 +16,19 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
+from itertools import cycle
 import json
 from pathlib import Path
 import re
 import threading
 import time
+from unittest.mock import Mock
 
 from abdf1_ros.cli.conform import main
 from abdf1_ros.client import Client
 from abdf1_ros.conform.case import Case, CaseResult, Permission, Verdict
 from abdf1_ros.conform.wire import Wire
+from abdf1_ros.df1.frames import Damaged
 from abdf1_ros.errors import Abdf1Error
 import pytest
 from support.cases import for_all
@@ -94,7 +97,7 @@ def test_failures_skips_noise_and_early_enquiries_are_told(
     def results(cases: Sequence[Case], wire: Wire, end: object,
                 allowed: frozenset[Permission]) -> Iterator[CaseResult]:
         assert allowed == permissions
-        wire.noise, wire.enquired_after, wire.has_heard = 3, 0.6, True
+        wire.noise, wire.enquired_after, wire.has_heard = 3, 0.78, True
         yield CaseResult(cases[0], Verdict.FAIL, 0.1, 'ACK', 'NAK', ('we   10 05',))
         yield CaseResult(cases[0], Verdict.SKIP, got='needs a word')
 
@@ -110,6 +113,15 @@ def test_failures_skips_noise_and_early_enquiries_are_told(
         assert all(text in said.out for text in told)
         assert 'conform: 3 bytes outside of any symbol were' in said.err
         assert '--answer-time 1 that may look like a fault: try --answer-time 0.3\n' in said.err
+
+
+def test_damaged_character_is_not_an_answer(
+        capsys: Output, monkeypatch: pytest.MonkeyPatch) -> None:
+    said = cycle([b'\x10', Damaged(b'\x04')])
+    monkeypatch.setattr('abdf1_ros.cli.conform.open_port', lambda settings: Mock(
+        read=lambda *wait: next(said)))
+    assert main(['slave', '--port=/dev/ttyS0', '--only=poll-idle', '--answer-time=0.01']) == 1
+    assert 'FAIL  poll-idle' in capsys.readouterr().out
 
 
 def test_processor_of_another_family_is_not_read(tmp_path: Path, capsys: Output) -> None:
@@ -204,9 +216,8 @@ def test_port_that_cannot_be_opened_is_one_and_what_is_wrong_in_options_two(
 
 @for_all('args', [
     ['slave', '--only', 'nothing'], ['slave', '--only', 'nak-limit'],  # which is one of a peer
-    ['slave', '--station', '255'], ['slave', '--count', '0'], ['slave', '--count', '42'],
-    ['slave', '--answer-time', '30.1'], ['slave', '--timeout', '300'],
-    ['slave', '--tcp', 'nowhere'], ['slave', '--tcp', 'a:99999'],
+    ['slave', '--station', '255'], ['slave', '--count', '0'], ['slave', '--count', '101'],
+    ['slave', '--tcp', 'nowhere'], ['slave', '--tcp', 'a:99999'], ['slave', '--pty=x', '--port=y'],
     ['peer', '--words', 'F8:0'], ['peer', '--echo'], ['slave', '--duplex', 'half'], []])
 def test_usage_is_shown_for_impossible_options(args: list[str]) -> None:
     with pytest.raises(SystemExit) as end:

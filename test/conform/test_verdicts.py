@@ -520,6 +520,11 @@ def test_silence_counts_from_the_last_byte_that_was_sent() -> None:
         wire.send(bytes(size))
     assert wire.hear(0.5) is None
     assert line.now == pytest.approx(2.0)
+    line.data = codec.ACK
+    wire.send(bytes(100))
+    with pytest.raises(Failed):
+        wire.until(lambda symbol: False, '', 0.5)
+    assert line.now >= 3.5
 
 
 def test_symbol_that_begins_late_is_heard_to_its_end() -> None:

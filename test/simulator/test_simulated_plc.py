@@ -435,6 +435,7 @@ def test_plcs_behind_a_gateway_are_one_station_of_the_line(tmp_path: Path) -> No
 
 @for_all(('first', 'second', 'text'), [
     ('1,PLC5,N7:0,,,,', '1,SLC,N7:0,,,,', '3:2 (PLC_Type): station 1 is a PLC5 already'),
+    ('1,SLC,N7:0,,,,,,5/03', '1,SLC,N9:0,,,,,,5/04', '3:9 (Processor): station 1 is 5/03 already'),
     ('1,PLC5,N7:0,,,,', '1,PLC5,F7:0,,,,', '3:3 (Address): file 7 is of type N already'),
     *(('1,PLC5,N7:0,,,,,10', second, f'3:8 (Via): {text}') for second, text in (
         ('1,PLC5,F8:0,,,,,11', 'station 1 is behind gateway 10 already'),

@@ -786,7 +786,7 @@ class _Radio(Wire):
             return self.refused(data)
         dst, src = data[:2]
         if src == self.own_number:
-            if self.has(Habit.SENDS_ON_OWN):
+            if self.has(Habit.SENDS_ON_OWN) and (data[2] & 0x40 or self.own_number == 5):
                 self.say(self.frame(data), 0.1)
             return
         is_new = data not in self._sent_on or self.has(Habit.SENDS_ON_AGAIN)
