@@ -28,6 +28,7 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from decimal import Context, ROUND_DOWN
+import math
 import random
 import re
 import time
@@ -365,8 +366,8 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
                      f'{target.value}; --list shows them')
     if not 0 <= options.station <= MAX_STATION:
         parser.error(f'--station {options.station} should be from 0 to {MAX_STATION}')
-    if not 1 <= options.count <= 100:
-        parser.error(f'--count {options.count} should be from 1 to 100')
+    if not 1 <= options.count <= _MOST_WORDS:
+        parser.error(f'--count {options.count} should be from 1 to {_MOST_WORDS}')
     if [options.pty, options.tcp, options.port].count(None) < 2:
         parser.error('--pty, --tcp and --port: give one of them')
     if options.tcp is not None:

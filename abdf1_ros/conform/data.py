@@ -294,14 +294,11 @@ def address_forms(end: AskingEnd) -> None:
       'M 13-10 to 13-15', *_ANSWERING, permission=Permission.WRITE)
 def address_forms_agree(end: AskingEnd) -> None:
     forms, wanted = _address_forms(end), b'\x34\x12'
-    before = _read(end, 1)
-    try:
+    with _kept(end, 1):
         _data(end.ask(_TYPED, _write_body(end.words, wanted)))
         for reply, address in ((_ask_at(end, address), address) for address in forms):
             if not reply[3] and (got := _integers(reply, 1, 'PLC5')) != wanted:
                 raise Failed(f'{wanted.hex(" ")} at {address.hex(" ")}', got.hex(' '))
-    finally:
-        _data(end.ask(_TYPED, _write_body(end.words, before)))
 
 
 @case('An element that does not exist is refused, not answered with data.',

@@ -146,7 +146,7 @@ def _embed(end: PeerEnd, command: bytes, response: bytes) -> Symbol | None:
 
 def _hear_next(end: PeerEnd) -> Symbol | None:
     """Return what comes after the answer to ``_embed``, which may be a reply."""
-    return end.wire.hear(max(_ack_timeout(end), end.reply_time), answers=False)
+    return end.wire.hear(max(ack_timeout(end.wire), end.reply_time), answers=False)
 
 
 @case('A response inside a message counts, and is not part of the message.', 'M 4-3', _PEER)
@@ -154,7 +154,7 @@ def embedded_response(end: PeerEnd) -> None:
     first, second = end.command(body=b'\x00one'), end.command(body=b'\x00two')
     end.deliver(first)
     check_reply(first, end.collect(acknowledge=False))
-    heard = _embed(end, second, codec.ACK), end.wire.hear(ack_timeout(end.wire), answers=False)
+    heard = _embed(end, second, codec.ACK), _hear_next(end)
     kinds = {symbol.kind: symbol for symbol in heard if symbol}  # the reply may be the first
     if SymbolKind.ACK not in kinds:
         raise Failed('DLE ACK for a message with an embedded response', str(heard[0] or 'silence'))
@@ -169,8 +169,7 @@ def embedded_nak(end: PeerEnd) -> None:
     end.deliver(first)
     refused = check_reply(first, end.collect(acknowledge=False))
     response = _embed(end, second, codec.NAK)
-    heard = {symbol.kind: symbol for symbol in (
-        response, end.wire.hear(ack_timeout(end.wire), answers=False)) if symbol}
+    heard = {symbol.kind: symbol for symbol in (response, _hear_next(end)) if symbol}
     again = heard.get(SymbolKind.MESSAGE)
     if again is None or again.data != refused:
         raise Failed('the reply again that was refused', again.data.hex(' ') if again else

@@ -114,7 +114,7 @@ def own_packet_dropped(end: RadioEnd) -> None:
     reply = end.ask(0x06, b'\x00')
     # With another TNS: the wire passes over a reply that comes again as it was.
     for packet in (reply[:4] + bytes((reply[4] ^ 0x55,)) + reply[5:],
-                   header(_for_another(end), end.station, 0x06, 1)):
+                   header(end.another, end.station, 0x06, 1)):
         end.send(packet)
         end.wire.expect_silence('it is a packet of its own', 2 * end.wire.answer_time)
 

@@ -216,7 +216,8 @@ def test_port_that_cannot_be_opened_is_one_and_what_is_wrong_in_options_two(
 
 @for_all('args', [
     ['slave', '--only', 'nothing'], ['slave', '--only', 'nak-limit'],  # which is one of a peer
-    ['slave', '--station', '255'], ['slave', '--count', '0'], ['slave', '--count', '101'],
+    ['slave', '--station', '255'], ['slave', '--count', '0'], ['slave', '--count', '42'],
+    ['slave', '--answer-time', '30.1'], ['slave', '--timeout', '300'],
     ['slave', '--tcp', 'nowhere'], ['slave', '--tcp', 'a:99999'], ['slave', '--pty=x', '--port=y'],
     ['peer', '--words', 'F8:0'], ['peer', '--echo'], ['slave', '--duplex', 'half'], []])
 def test_usage_is_shown_for_impossible_options(args: list[str]) -> None:

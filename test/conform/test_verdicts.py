@@ -338,6 +338,12 @@ def test_fault_of_a_plc5_is_found(habit: Habit, name: str) -> None:
     assert result.verdict is Verdict.FAIL and not set().union(*line.files) - {0}
 
 
+@for_all('station', [7, 252, 253, 254])
+def test_radio_node_of_any_number_is_right(station: int) -> None:
+    line = MutatedRadioNode('CRC', station=station)
+    assert failures(results_of(line, Target.RADIO, 'CRC', station=station)) == []
+
+
 def test_plc5_that_refuses_an_area_fails_address_forms() -> None:
     line = MutatedPeer('CRC', Habit.REFUSES_AREA, family='PLC5')
     assert failures(results_of(line, Target.PEER, 'CRC', 'PLC5')) == [
