@@ -292,11 +292,13 @@ class Driver:
         """
         Return the station that a guest means.
 
-        In Mode Peer this is the one PLC, whatever the DST. If there are several stations, a
-        gateway answers for them, and the DST decides.
+        In Mode Peer this is the one PLC, whatever the DST. If a gateway answers for it, or for
+        several stations, the DST decides.
         """
-        numbers = [station.number for station in self.stations]
-        return numbers[0] if self.network.line_mode.has_one_plc and len(numbers) == 1 else dst
+        stations = [*self.stations]
+        is_only = self.network.line_mode.has_one_plc and len(stations) == 1 \
+            and not stations[0].has_gateway
+        return stations[0].number if is_only else dst
 
     def _words_of_guest(self, command: Packet, station: int) -> list[Extent] | None:
         # A PLC-5 has separate words for each station number that sends it PLC-2 writes. On the
