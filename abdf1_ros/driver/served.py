@@ -146,6 +146,23 @@ class Served:
         mapping.codec.store(self.table, _first_word(mapping), values)
         self.table.changed.clear()  # our own writes are not reported
 
+    def take_over(self, before: Served) -> None:
+        """Store what was served before, of the bits that both have a row for."""
+        theirs = before._bits()
+        for (area, offset), bits in self._bits().items():
+            if bits := bits & theirs[area, offset]:
+                place = slice(2 * offset, 2 * offset + 2)
+                word = int.from_bytes(before.table.words[area][place], 'little')
+                self.table.words[area][place] = (word & bits).to_bytes(2, 'little')
+
+    def _bits(self) -> defaultdict[tuple[Area, int], int]:
+        """Return the bits that rows have, by area and offset of their word."""
+        found: defaultdict[tuple[Area, int], int] = defaultdict(int)
+        for mapping in self._mappings:
+            for offset, mask in enumerate(mapping.codec.masks(), mapping.extent.first):
+                found[mapping.extent.area, offset] |= mask
+        return found
+
 
 def _first_word(mapping: Mapping) -> Address:
     return mapping.address.at_offset(mapping.address.offset)

@@ -72,11 +72,12 @@ class _Exchange:
     """The next machine of a line; ``is_done`` is set when it has replaced the last machine."""
 
     def __init__(self, machine: Machine, while_sending: Callable[[], None], reopen: bool,
-                 reason: str) -> None:
+                 reason: str, take_over: Callable[[], None]) -> None:
         self.reason = reason
         self.machine = machine
         self.while_sending = while_sending
         self.reopen = reopen
+        self.take_over = take_over
         self.is_done = threading.Event()
         self._claim = threading.Lock()
 
@@ -203,16 +204,18 @@ class LinkThread(threading.Thread):
         self.is_released = False
         self.wake()
 
-    def exchange(self, machine: Machine, while_sending: Callable[[], None],
-                 reopen: bool, reason: str = _READ_AGAIN) -> bool:
+    def exchange(self, machine: Machine, while_sending: Callable[[], None], reopen: bool,
+                 reason: str = _READ_AGAIN,
+                 take_over: Callable[[], None] = lambda: None) -> bool:
         """
         Go on with another machine, on the same port, or with ``reopen`` on a newly opened port.
 
-        Commands under way end with an error that tells the ``reason``. Return True if the machine
-        is on the line within about 5 s. If not, the exchange is cancelled. Called from one thread
-        only.
+        Commands under way end with an error that tells the ``reason``. ``take_over`` is called in
+        the link's thread: the old machine has stopped, and the other has not begun. Return True
+        if the machine is on the line within about 5 s. If not, the exchange is cancelled. Called
+        from one thread only.
         """
-        exchange = _Exchange(machine, while_sending, reopen, reason)
+        exchange = _Exchange(machine, while_sending, reopen, reason, take_over)
         self._next = exchange
         self.wake()
         return self._has_happened(exchange.is_done) or (
@@ -291,6 +294,7 @@ class LinkThread(threading.Thread):
         if exchange is not None and exchange.claim():
             self._machine.stop(PortLost(exchange.reason))
             self._while_sending()
+            exchange.take_over()
             self._machine, self._while_sending = exchange.machine, exchange.while_sending
             exchange.is_done.set()
 

@@ -318,6 +318,15 @@ def test_command_for_several_words_is_published_once_and_all_or_nothing() -> Non
     assert (guarded.read('B3:0', 2), guarded.heard()) == (bytes(4), [])
 
 
+def test_new_files_keep_the_words_of_their_rows() -> None:
+    before = Bench('SLC', row('N7:50', 'SLC', 4), row('B3:5/0', 'SLC', 8), row('N9:0', 'SLC'))
+    before.write('N7:50', 5, 6, 7, 8)
+    before.write('B3:5', 0x8081)
+    after = Bench('SLC', row('N7:52', 'SLC', 3), row('B3:5/4', 'SLC', 20), row('F8:0', 'SLC'))
+    after.served.take_over(before.served)
+    assert after.read('N7:52', 3) + after.read('B3:5') == b'\7\0\x08\0\0\0\x80\0'
+
+
 def test_refused_command_is_undone_in_each_of_its_words() -> None:
     bench = Bench('SLC', row('B3:0', 'SLC', 3), replace(row('B3:3', 'SLC'), is_read_only=True))
     assert bench.write('B3:0', 1, 2, 3) == (0, b'')

@@ -138,6 +138,15 @@ def test_writes_go_to_the_new_map(bench: Bench) -> None:
     assert writes.message == 'OK: 1 of 1 writes confirmed'
 
 
+def test_words_that_plcs_read_stay(bench: Bench) -> None:
+    bench.write_map('ours,Serve,N7:50,5,PLC5,1')
+    for earlier in bytes(2), b'\7\0':
+        assert bench.reload()[0]
+        served, mapping = bench.node.session.driver.served, bench.node.session.driver.mappings[0]
+        assert served.words_of(mapping) == earlier
+        served.store(mapping, [7])
+
+
 def test_row_of_another_message_type_or_address_has_a_new_topic(bench: Bench) -> None:
     for address, kind, values in (
             ('F8:0', Float32MultiArray, [1.5]), ('N7:1', Int16MultiArray, [8]),
