@@ -23,11 +23,14 @@ from typing import Any
 
 from abdf1_ros.ros.bridge.offer import OfferedPublisher
 from abdf1_ros.ros.topics.reads import ReadTopic, ReadTopics
+from abdf1_ros.settings.heartbeats import While
 from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.scaling import Scaling
 import pytest
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.qos import QoSProfile
 from std_msgs.msg import UInt8
+from support.cases import for_all
 from support.mappings import make_mapping
 
 
@@ -157,6 +160,21 @@ def test_values_of_a_line_that_was_lost_do_not_come_when_it_is_back() -> None:
     after.open({row: points[row]})
     for gone in [f'-{tag}' for tag in tags[1:]], []:
         assert node.noted(after.take_over) == gone
+
+
+@for_all(('changed', 'notes'), [
+    ({'period': 990, 'description': 'x', 'command': 'ReadWrite'}, []), ({'station': 2}, ['+a']),
+    ({'via': 2}, ['+a']), ({'length': 2}, ['+a']), ({'scaling': Scaling(0.1)}, ['+a']),
+    ({'word_order': 'High'}, ['+a']), ({'condition': While(('RUN',))}, ['+a'])])
+def test_row_with_other_values_has_a_publisher_that_kept_none(
+        changed: dict[str, Any], notes: list[str]) -> None:
+    node, point = Recorder(), SimpleNamespace(stale_time=1.0)
+    published: dict[str, ReadTopic] = {}
+    old, new = (make_mapping('F8:0', tag='a', **{'scaling': Scaling(1.8), **more})
+                for more in ({}, changed))
+    topics: Any = ReadTopics
+    topics(node, published).offer({old: point})
+    assert node.noted(topics(node, published).open, {new: point}) == notes
 
 
 @pytest.mark.parametrize(('old', 'new', 'is_fit'), [

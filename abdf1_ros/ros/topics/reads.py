@@ -21,6 +21,7 @@ from collections.abc import Callable
 from collections.abc import Mapping as MappingType
 from dataclasses import dataclass
 import math
+from operator import attrgetter
 
 from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.pccc.values import Values
@@ -40,6 +41,11 @@ _VALUES_AT_ONCE = 4
 # deadline that is a little too short gives no false alarm.
 _MARGIN = 1.5
 
+# What decides where the values of a row come from, and what they mean: a late subscriber must not
+# get the last value of another PLC, or one in another unit.
+_SHAPE = attrgetter('message_type', 'address', 'length', 'station', 'via', 'serves', 'access',
+                    'type', 'word_order', 'scaling', 'condition')
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReadTopic:
@@ -47,7 +53,7 @@ class ReadTopic:
     A publisher, with the properties of the row that it was made for.
 
     - ``encode``: turns values into a message
-    - ``shape``: message type, address and length of the row
+    - ``shape``: all that decides the values of the row, first their message type
     - ``promise``: longest time (s) between two values; infinite if the row promises none
     """
 
@@ -124,7 +130,7 @@ class ReadTopics:
         self._published.update(self._topics)
 
     def _topic(self, mapping: Mapping, point: ReadPoint, old: ReadTopic | None) -> ReadTopic:
-        shape = mapping.message_type, str(mapping.address), mapping.length
+        shape = _SHAPE(mapping)
         promise = mapping.promise(point.stale_time)
         if old is not None and old.is_fit_for(shape, promise):
             return old
