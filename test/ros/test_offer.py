@@ -178,8 +178,8 @@ def test_row_with_other_values_has_a_publisher_that_kept_none(
 
 
 @pytest.mark.parametrize(('old', 'new', 'is_fit'), [
-    (2.0, 3.0, True), (2.0, 3.1, False), (3.0, 2.0, True), (math.inf, 2.0, False),
-    (2.0, math.inf, False), (math.inf, math.inf, True)])
+    (2.0, 3.0, True), (2.0, 3.1, False), (3.0, 2.0, True), (3.1, 2.0, False),
+    (math.inf, 2.0, False), (2.0, math.inf, False), (math.inf, math.inf, True)])
 def test_publisher_is_kept_where_the_promise_is_about_the_same(
         old: float, new: float, is_fit: bool) -> None:
     publisher: Any = None

@@ -20,7 +20,6 @@ from collections import deque
 from collections.abc import Callable
 from collections.abc import Mapping as MappingType
 from dataclasses import dataclass
-import math
 from operator import attrgetter
 
 from abdf1_ros.driver.reads.point import ReadPoint
@@ -37,7 +36,7 @@ from rclpy.publisher import Publisher
 # line by 3 ms.
 _VALUES_AT_ONCE = 4
 
-# A publisher is kept if the new row promises at most this multiple of the old row's time. A
+# A publisher is kept if the promises of the old and the new row differ by at most this factor. A
 # deadline that is a little too short gives no false alarm.
 _MARGIN = 1.5
 
@@ -64,8 +63,8 @@ class ReadTopic:
 
     def is_fit_for(self, shape: tuple[object, ...], promise: float) -> bool:
         """Return True if a row can use this publisher and subscribers notice no difference."""
-        return shape == self.shape and promise <= _MARGIN * self.promise and \
-            math.isinf(promise) is math.isinf(self.promise)
+        return shape == self.shape and \
+            self.promise / _MARGIN <= promise <= _MARGIN * self.promise
 
 
 class ReadTopics:
