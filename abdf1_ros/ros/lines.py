@@ -358,7 +358,7 @@ def _make(given: Sequence[str]) -> Program:
     own_name, files = _own_name(given), parameter_files(given)
     names = sections(files, own_name)
     _allow_files()
-    arguments = Arguments(files, others=names)
+    arguments = Arguments.of(given, names)
     node = LinesNode(arguments)
     for name, (first, *others) in names.items():
         for place in others:

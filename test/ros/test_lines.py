@@ -374,6 +374,13 @@ def test_faulty_line_ends_all_where_that_is_asked_for(plant: Plant) -> None:
     assert plant.end() == 2
 
 
+def test_parameter_for_no_line_is_not_passed_over(plant: Plant, capfd: Output) -> None:
+    plant.start('-p', 'abdf1:read_only:=true')
+    plant.thread.join(PATIENCE)
+    assert plant.end() == 2
+    assert 'this node is /hall/c; leave out "abdf1:"' in capfd.readouterr().err
+
+
 def test_two_lines_have_not_one_port_nor_one_place_of_guests(plant: Plant) -> None:
     other_name, place = plant.folder / 'other_name', f'pty:{plant.folder}/hmi'
     other_name.symlink_to(plant.plcs['a'].port)

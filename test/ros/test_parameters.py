@@ -474,6 +474,15 @@ def test_sections_of_other_lines_of_the_process_are_theirs(
     assert configure(make_node(files), Arguments(theirs.files, others=['/press/abdf1'])).mappings
 
 
+def test_parameters_of_the_command_line_of_many_lines(make_node: Nodes, files: Files) -> None:
+    args = ['--ros-args', '-p', 'press:read_only:=true', '-p', 'gain:=3',
+            '-p', 'abdf1:read_only:=true', '-p', 'parameters:loss:=3']
+    node = make_node(files, cli_args=args)
+    assert problems_of(node, Arguments.of(args, ['/press'])) == [
+        'parameter abdf1:read_only: this node is /parameters; leave out "abdf1:"',
+        'parameter loss: there is no such parameter; another version may have it']
+
+
 @pytest.mark.parametrize('section', [
     '/**', '/*', '/robot_1/*', '/robot_1/**', '/**/abdf1', '/*/abdf1', '/abdf1', '/robot_1/abdf1',
     '/robot_2/**', '/*/*/*', '/**/robot_1/*', '/robot_1'])

@@ -58,19 +58,24 @@ class Arguments:
     others: Collection[str] = ()
 
     @classmethod
-    def of(cls, args: Sequence[str]) -> Arguments:
-        """Return the parameters in the arguments of a process with one node."""
+    def of(cls, args: Sequence[str], others: Collection[str] = ()) -> Arguments:
+        """Return the parameters in the arguments of a process."""
         rules = [rule.partition(':=') for option, rule in zip(args, args[1:], strict=False)
                  if option in ('-p', '--param')]
         typed = []
         for left, _, value in rules:
             node, _, name = left.rpartition(':')
             typed.append(Typed(node.strip('/'), name, value))
-        return cls(parameter_files(args), typed)
+        return cls(parameter_files(args), typed, others)
 
     def typed_for(self, full_name: str) -> dict[str, str]:
         """Return the command line's parameters for a node, as text."""
         return {typed.name: typed.value for typed in self.typed if typed.is_for(full_name)}
+
+    def only_for(self, full_name: str) -> set[str]:
+        """Return the names on the command line that only this node of the process gets."""
+        return {typed.name for typed in self.typed
+                if typed.is_for(full_name) and (typed.node or not self.others)}
 
     def misdirected(self, full_name: str, usual_name: str,
                     known: Collection[str]) -> Iterator[Problem]:
@@ -83,7 +88,8 @@ class Arguments:
         for path in self.files:
             yield from self._of_others(path, full_name, usual_name, {*known} - _USUAL_NAMES)
         for typed in self.typed:
-            if not typed.is_for(full_name) and typed.name in known:
+            if typed.name in known and not (
+                    typed.is_for(full_name) or f'/{typed.node}' in self.others):
                 yield Problem(f'parameter {typed.node}:{typed.name}', (
                     f'this node is {full_name}; leave out "{printable(typed.node)}:"'))
 

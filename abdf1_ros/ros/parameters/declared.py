@@ -308,14 +308,15 @@ def wrong_names(node: Node, given: Given, arguments: Arguments, known: Collectio
     """
     Return faults of parameters that do not exist, are for another node, or are octal.
 
-    In sections that name this node, and on the command line, every name is checked. Elsewhere, a
-    name is checked only if it resembles ours or starts with ``begins``: all other names may belong
-    to other nodes. ``map.*`` is allowed, because a dump of our parameters contains it; see
-    ``_ignored``. Numbers with a leading zero are reported, because YAML reads them as octal.
+    In sections that name this node, and on the command line if no other node gets the parameter,
+    every name is checked. Elsewhere, a name is checked only if it resembles ours or starts with
+    ``begins``: all other names may belong to other nodes. ``map.*`` is allowed, because a dump of
+    our parameters contains it; see ``_ignored``. Numbers with a leading zero are reported, because
+    YAML reads them as octal.
     """
     full_name = node.get_fully_qualified_name()
     problems = [*arguments.misdirected(full_name, usual_name, known)]
-    typed = arguments.typed_for(full_name)
+    typed, only_ours = arguments.typed_for(full_name), arguments.only_for(full_name)
     found = set(_OF_RCLPY)
     for section, name, place, number in parameters_in(arguments.files):
         if section == full_name:
@@ -329,7 +330,7 @@ def wrong_names(node: Node, given: Given, arguments: Arguments, known: Collectio
         is_other = name.startswith('qos_overrides.') and f'.{full_name}/' not in name
         if name in found or name in known or _is_of_map(name) or is_other:
             continue
-        if hint := _nearest(name, known, begins, 0.5 if name in typed else 0.75):
+        if hint := _nearest(name, known, begins, 0.5 if name in only_ours else 0.75):
             problems.append(Problem(f'parameter {name}', f'there is no such parameter; {hint}'))
     for name in given.keys() & typed.keys() & {*known}:
         problems += _octal(f'parameter {name}', '', typed[name])
