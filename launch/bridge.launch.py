@@ -22,9 +22,15 @@ abdf1_ros bridge.launch.py --show-args`` lists all arguments.
 
 import sys
 
-from abdf1_ros.ros.launching import descriptions, parameter_types, unknown_arguments
+from abdf1_ros.ros.launching import descriptions, parameter_types, scope_of, unknown_arguments
 from launch import LaunchContext, LaunchDescription, LaunchDescriptionEntity
-from launch.actions import DeclareLaunchArgument, LogInfo, OpaqueFunction, TimerAction
+from launch.actions import (
+    DeclareLaunchArgument,
+    GroupAction,
+    LogInfo,
+    OpaqueFunction,
+    TimerAction,
+)
 from launch.events.process import ProcessExited
 from launch.substitutions import TextSubstitution
 from launch_ros.actions import Node
@@ -49,11 +55,15 @@ def start_node(context: LaunchContext) -> list[LaunchDescriptionEntity]:
                      for name in ('net_file', 'map_file') if not arguments[name]]
     if problems:
         raise RuntimeError('; '.join(problems))
-    return [bridge(arguments)]
+    return [bridge(arguments, OpaqueFunction(function=scope_of(context)))]
 
 
-def bridge(arguments: dict[str, str]) -> Node:
-    """Return a bridge that is started again if ``arguments`` say so, unless it refused them."""
+def bridge(arguments: dict[str, str], restore: OpaqueFunction) -> Node:
+    """
+    Return a bridge that is started again if ``arguments`` say so, unless it refused them.
+
+    ``restore`` brings back the scope of its first start.
+    """
     def started_again(event: ProcessExited,
                       context: LaunchContext) -> list[LaunchDescriptionEntity]:
         if arguments['respawn'] not in YES or context.is_shutdown:
@@ -62,7 +72,8 @@ def bridge(arguments: dict[str, str]) -> Node:
             return [LogInfo(msg=f'{event.process_name}: not started again after status {FAULTY}: '
                                 'faulty files or parameters')]
         return [LogInfo(msg=f'{event.process_name}: to be started again in {RESPAWN_DELAY:g} s'),
-                TimerAction(period=RESPAWN_DELAY, actions=[bridge(arguments)])]
+                TimerAction(period=RESPAWN_DELAY, actions=[
+                    GroupAction([restore, bridge(arguments, restore)])])]
 
     # With types: otherwise launch turns a text that looks like a number into a number.
     given = {name: ParameterValue(TextSubstitution(text=arguments[name]), value_type=kind)

@@ -23,7 +23,7 @@ launch.
 
 import sys
 
-from abdf1_ros.ros.launching import unknown_arguments
+from abdf1_ros.ros.launching import scope_of, unknown_arguments
 from launch import LaunchContext, LaunchDescription
 from launch.actions import (
     DeclareLaunchArgument,
@@ -57,19 +57,25 @@ def line(namespace: str) -> GroupAction:
         condition=UnlessCondition(LaunchConfiguration('one_process')))
 
 
-def started_again(event: ProcessExited, context: LaunchContext) -> list[TimerAction]:
-    """Return the actions that start all bridges again, unless their settings are faulty."""
-    if context.is_shutdown or event.returncode == FAULTY:
-        return []
-    return [TimerAction(period=2.0, actions=[all_lines()])]
-
-
-def all_lines() -> Node:
+def start_lines(context: LaunchContext) -> list[Node]:
     """Return all bridges in one process."""
+    return [all_lines(OpaqueFunction(function=scope_of(context)))]
+
+
+def all_lines(restore: OpaqueFunction) -> Node:
+    """
+    Return all bridges in one process, started again unless their settings are faulty.
+
+    ``restore`` brings back the scope of their first start.
+    """
+    def started_again(event: ProcessExited, context: LaunchContext) -> list[TimerAction]:
+        if context.is_shutdown or event.returncode == FAULTY:
+            return []
+        return [TimerAction(period=2.0, actions=[GroupAction([restore, all_lines(restore)])])]
+
     sections = ParameterFile(LaunchConfiguration('lines_file'), allow_substs=True)
     return Node(package='abdf1_ros', executable='lines', output='screen', parameters=[sections],
-                on_exit=started_again,
-                condition=IfCondition(LaunchConfiguration('one_process')))
+                on_exit=started_again)
 
 
 def refuse_unknown(context: LaunchContext) -> None:
@@ -92,5 +98,6 @@ def generate_launch_description() -> LaunchDescription:
             description='true: all bridges in one process'),
         OpaqueFunction(function=refuse_unknown),
         *map(line, LINES),
-        all_lines(),
+        OpaqueFunction(function=start_lines,
+                       condition=IfCondition(LaunchConfiguration('one_process'))),
     ])

@@ -143,18 +143,22 @@ def test_log_level_is_that_of_the_node_alone(launch: Starter, namespace: str) ->
     assert {match[2] for match in lines if match} == {f'{namespace}.abdf1'.lstrip('.')}
 
 
-def test_log_level_reaches_a_node_below_a_pushed_namespace(
-        launch: Starter, tmp_path: Path) -> None:
-    outer = tmp_path / 'outer.launch.xml'
+def grouped(folder: Path, *arguments: str) -> Process:
+    """Launch a bridge from the launch file of a robot, which has a namespace and a parameter."""
+    outer = folder / 'outer.launch.xml'
     outer.write_text(
-        '<launch><push-ros-namespace namespace="hall"/>'
+        '<launch><group><push-ros-namespace namespace="hall"/>'
+        '<set_parameter name="port" value="/dev/ttyS99"/>'
         '<include file="$(find-pkg-share abdf1_ros)/launch/bridge.launch.py">'
         + ''.join(f'<arg name="{name}" value="{value}"/>' for name, _, value in (
-            text.partition(':=') for text in (
-                *EXAMPLE, 'namespace:=cell', 'log_level:=fatal', 'port:=/dev/ttyS99')))
-        + '</include></launch>', encoding='utf-8')
+            text.partition(':=') for text in (*EXAMPLE, *arguments)))
+        + '</include></group></launch>', encoding='utf-8')
+    return ros2('launch', str(outer))
+
+
+def test_log_level_reaches_a_node_below_a_pushed_namespace(tmp_path: Path) -> None:
     with Observer() as observer:
-        process = ros2('launch', str(outer))
+        process = grouped(tmp_path, 'namespace:=cell', 'log_level:=fatal')
         assert get_parameters(observer, 'port', node='/hall/cell/abdf1') == ['/dev/ttyS99']
         assert not LOG_LINE.search(ended(process))
 
@@ -169,12 +173,12 @@ def test_faulty_configuration_is_not_started_again(launch: Starter, yes: str) ->
     assert 'exit code 2' in process.text
 
 
-def test_killed_bridge_is_started_again_until_the_launch_ends(launch: Starter) -> None:
-    process = launch('bridge.launch.py', *EXAMPLE, 'port:=/dev/ttyS99', 'respawn:=true')
+def test_killed_bridge_is_started_again_in_its_group_until_the_launch_ends(tmp_path: Path) -> None:
+    process = grouped(tmp_path, 'respawn:=true')
     for _ in range(2):
         before = len(process.lines)
         started = process.wait_for('process started with pid', after=before if _ else 0)
-        process.wait_for('/dev/ttyS99: cannot open the port', after=before if _ else 0)
+        process.wait_for('[hall.abdf1]: /dev/ttyS99: cannot', after=before if _ else 0)
         match = re.search(r'pid \[(\d+)\]', started)
         assert match
         os.kill(int(match[1]), signal.SIGKILL)

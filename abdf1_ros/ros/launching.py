@@ -12,14 +12,16 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Arguments of the launch files: the node's parameters; a check for unknown names."""
+"""Arguments of the launch files, a check for unknown names, and the scope of a restart."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from copy import deepcopy
 from dataclasses import fields
 import difflib
 from pathlib import Path
+from typing import Any
 
 from abdf1_ros.ros.parameters.declared import Parameters
 
@@ -54,3 +56,20 @@ def unknown_arguments(file: str, known: Iterable[str], argv: Sequence[str]) -> l
             hint = f'did you mean {close[0]}?' if close else '--show-args lists them'
             problems.append(f'{name}: there is no such argument; {hint}')
     return problems
+
+
+def scope_of(context: Any) -> Callable[[Any], None]:
+    """
+    Return a function that makes a launch context what ``context`` is now.
+
+    A group has ended when its node is started again. Its namespace, parameters, remappings and
+    environment have ended with it.
+    """
+    now = deepcopy(context.launch_configurations), dict(context.environment)
+
+    def restore(later: Any) -> None:
+        for current, values in zip((later.launch_configurations, later.environment), now,
+                                   strict=True):
+            current.clear()
+            current.update(values)
+    return restore
