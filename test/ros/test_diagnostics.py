@@ -528,6 +528,8 @@ def test_station_that_answers_polls_and_no_command(bench: Bench) -> None:
     assert bench.says('station 1') == told
     assert bench.says('link') == (
         WARN, 'WARN: port open, but 1 of 2 stations answer polls and no command')
+    stations.lost(2, NOW)
+    assert bench.says('link')[0] == ERROR  # no station replies to commands
     stations.lost(1, NOW)  # it comes and goes
     assert bench.says('station 1', NOW + 9.9) == told
     assert bench.says('station 1', NOW + 10) == (ERROR, 'ERROR: station 1 inactive for 10.0 s')
@@ -575,6 +577,8 @@ def test_station_that_its_gateway_does_not_reach_is_not_called_silent(bench: Ben
     bench.driver.stations[2].overdue = 2  # late refusals count so
     assert bench.says('link') == (
         WARN, 'WARN: port open, 1 of 2 stations are not reached by their gateway')
+    bench.driver.stations[1].local_status = 0x02
+    assert bench.says('link')[0] == ERROR
 
 
 def test_refused_command_of_a_plc_is_told_for_a_minute(bench: Bench) -> None:

@@ -74,8 +74,11 @@ class LinkStatus:
     def _judge_stations(self, now: float) -> Judgement:
         stations = [*self._line.driver.stations]
         total, active = len(stations), sum(station.active for station in stations)
-        if deaf := len(self._line.deaf_stations(now)):
-            return WARN, f'port open, but {deaf} of {total} stations answer polls and no command'
+        if deaf := self._line.deaf_stations(now):
+            is_any_good = any(station.active and not takes_in_silence(station)
+                              and station.number not in deaf for station in stations)
+            return WARN if is_any_good else ERROR, (
+                f'port open, but {len(deaf)} of {total} stations answer polls and no command')
         if total and not active:
             if self._line.driver.overheard is not None:
                 return ERROR, f'port open, but none of {total} stations is heard'
@@ -88,8 +91,8 @@ class LinkStatus:
         if active < total:
             return WARN, f'port open, {total - active} of {total} stations do not answer'
         if unreached := sum(station.local_status != 0 for station in stations):
-            return WARN, (f'port open, {unreached} of {total} stations are not reached by their '
-                          'gateway')
+            return WARN if unreached < total else ERROR, (
+                f'port open, {unreached} of {total} stations are not reached by their gateway')
         if silent:
             return WARN, f'port open, {silent} of {total} stations take commands and do not reply'
         heard = sum(station.last_heard is not None for station in stations)
