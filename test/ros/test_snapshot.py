@@ -25,6 +25,7 @@ from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ros.topics.snapshot import Snapshot
 from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.scaling import Scaling
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 import pytest
 from support.cases import for_all
@@ -40,13 +41,12 @@ def status_of(mapping: Mapping, values: array | str | None, *others: Mapping,
     now = line_time()
     points = {row: ReadPoint(row, 1.0, 3.0) for row in (mapping, *others)}
     if values is not None:
-        points[mapping].last_good = now - age
+        points[mapping].raw, points[mapping].last_good = values, now - age
     if error == 'not in RUN':
         points[mapping].withhold(error, now)
     else:
         points[mapping].error = error
-    latest = {} if values is None else {mapping.topic: values}
-    return Snapshot(points, latest).message(now).status[0]
+    return Snapshot(points).message(now).status[0]
 
 
 def test_single_value_has_all_that_is_known_of_it() -> None:
@@ -89,11 +89,11 @@ def test_value_that_is_not_fresh_says_so(
     assert (status.level, status.message) == (level, message)
 
 
-def test_value_that_the_link_is_about_to_publish_is_not_missed() -> None:
-    row, now = make_mapping('N7:0'), line_time()
+def test_value_within_the_deadband_is_as_new_as_its_age() -> None:
+    row = make_mapping('N7:0', publish='Change', deadband=5.0, scaling=Scaling(0.5))
     point = ReadPoint(row, 1.0, 3.0)
-    point.last_good = now
-    assert Snapshot({row: point}, {}).message(now).status[0].message == 'OK: fresh'
+    assert [point.update(words, 1.0) for words in (b'\x08\0', b'\x09\0')][1] is None
+    assert Snapshot({row: point}).message(1.0).status[0].message == 'OK: 4.5, 0.0 s ago'
 
 
 # On its topic

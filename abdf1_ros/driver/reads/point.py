@@ -85,6 +85,7 @@ class ReadPoint:
     ``stale_time``. It is stale if it is older than ``stale_time``.
 
     - ``period``, ``stale_time``: in seconds.
+    - ``raw``: values of the last good read, as the PLC has them.
     - ``interval``: seconds between the last two good reads, None if a failed or withheld read was
       between them.
     - ``kept``: usual interval (s), None before it is known. A single long interval does not count,
@@ -102,6 +103,7 @@ class ReadPoint:
         self.mapping = mapping
         self.period = period
         self.stale_time = stale_time
+        self.raw: Values | None = None
         self.last_good: float | None = None
         self.interval: float | None = None
         self.kept: float | None = None
@@ -140,8 +142,14 @@ class ReadPoint:
                     self.kept + SMOOTHING * (least - self.kept)
         if self.withheld and self.guard is not None:
             self.guard.withheld.discard(self)
+        self.raw = values  # before its time, which other threads look at first
         self.last_good, self.error, self.withheld = now, None, ''
         return None if is_same else self._published(values)
+
+    @property
+    def values(self) -> Values | None:
+        """Return the values of the last good read, in the unit of the topic."""
+        return None if self.raw is None else self._published(self.raw)
 
     def values_of(self, words: bytes) -> Values:
         """Return the values of words, as they are published."""

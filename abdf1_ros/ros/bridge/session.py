@@ -326,7 +326,7 @@ class BridgeSession:
             return
         self._next_snapshot = now + period
         if self._surroundings.snapshot.has_subscribers():
-            self._snapshot = self._snapshot or Snapshot(self.driver.points, self.reads.latest)
+            self._snapshot = self._snapshot or Snapshot(self.driver.points)
             self._publish(self._surroundings.snapshot, self._snapshot.message(now))
 
     def _publish(self, publisher: RosPublisher, message: DiagnosticArray) -> None:

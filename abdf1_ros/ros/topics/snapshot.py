@@ -39,23 +39,20 @@ _LEVELS = {
 
 class Snapshot:
     """
-    One message with the last values of all ``points``; ``latest`` has the values by topic.
+    One message with the last values of all ``points``, also of those that were not published.
 
     Texts that never change are made once: a map may have five thousand rows.
     """
 
-    def __init__(self, points: MappingType[Mapping, ReadPoint],
-                 latest: MappingType[str, Values]) -> None:
+    def __init__(self, points: MappingType[Mapping, ReadPoint]) -> None:
         names = {(mapping.station, str(mapping.address)): mapping.tag
                  for mapping in points if mapping.length == 1}
         self._rows = [_ValueRow(mapping, point, names) for mapping, point in points.items()]
-        self._latest = latest
 
     def message(self, now: float) -> DiagnosticArray:
         """Return the values at the clock value ``now`` (s); the caller sets the stamp."""
         begun = time.time() - now
-        return DiagnosticArray(status=[
-            row.status(self._latest.get(row.topic), now, begun) for row in self._rows])
+        return DiagnosticArray(status=[row.status(now, begun) for row in self._rows])
 
 
 class _ValueRow:
@@ -63,7 +60,6 @@ class _ValueRow:
 
     def __init__(self, mapping: Mapping, point: ReadPoint,
                  names: MappingType[tuple[int, str], str]) -> None:
-        self.topic = mapping.topic
         self._point = point
         self._tag = printable(mapping.tag)
         self._place = f'station {mapping.station} {mapping.address}'
@@ -72,11 +68,11 @@ class _ValueRow:
             ('address', str(mapping.address)), ('type', mapping.type.value),
             ('topic', mapping.topic), ('description', mapping.description))]
 
-    def status(self, values: Values | None, now: float, begun: float) -> DiagnosticStatus:
+    def status(self, now: float, begun: float) -> DiagnosticStatus:
         """Return the row's status; the clock of ``now`` was 0 at ``begun`` (s since 1970)."""
         point = self._point
         freshness = point.freshness(now)
-        level, read = _LEVELS[freshness], point.last_good
+        level, read, values = _LEVELS[freshness], point.last_good, point.values
         why = point.error or point.withheld if level == DiagnosticStatus.ERROR else ''
         texts = [why] if why else []
         pairs: list[tuple[str, str]] = []
