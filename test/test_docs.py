@@ -169,6 +169,7 @@ def test_rows_of_a_table_have_as_many_cells_as_its_head(name: str) -> None:
 @for_all('name', documents.NAMES)
 def test_commands_and_their_options_exist(name: str) -> None:
     for line in code(name):
+        assert not re.search(r'[^$&\s] (?:sudo|ros2) [a-z]', line), f'two commands: {line}'
         match = OURS.search(line)
         if match is None or match[1] in ('node', 'lines'):  # all theirs are ROS arguments
             continue
