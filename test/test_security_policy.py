@@ -241,7 +241,7 @@ def test_two_robots_have_keys_for_their_own_namespace_and_no_more(
 
 def test_process_of_three_lines_is_allowed_exactly_what_its_nodes_do() -> None:
     """A bridge in such a process has no service for the descriptions of types."""
-    names = sections(str(ROOT / 'config' / 'three_lines.yaml'))
+    names = sections([str(ROOT / 'config' / 'three_lines.yaml')])
     profiles = ElementTree.parse(THREE_LINES).getroot().iter('profile')
     assert [f'{entry.attrib["ns"].rstrip("/")}/{entry.attrib["node"]}' for entry in profiles] == [
         '/lines', *names]

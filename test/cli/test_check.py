@@ -338,8 +338,8 @@ def test_error_of_one_pair_is_named_and_the_others_are_told(
 
 
 def test_two_lines_of_a_folder_on_one_port_are_an_error(tmp_path: Path, capsys: Output) -> None:
-    for name, port in (('dryer', '1'), ('glue', '/dev/ttyUSB0'), ('oven', '/dev/ttyS0'), ('paint', 'socket://localhost:4001'),
-                       ('press', 'rfc2217://127.1:4001')):
+    for name, port in (('dryer', '1'), ('glue', '/dev/ttyUSB0'), ('oven', '/dev/ttyS0'),
+                       ('paint', 'socket://localhost:4001'), ('press', 'rfc2217://127.1:4001')):
         write_csv(tmp_path / f'{name}_net.csv', NET_HEADER, [f'{GOOD_NET[:-1]}{port}'])
         write_csv(tmp_path / f'{name}_map.csv', MAP_HEADER, [GOOD_ROW.replace('1000', '10')])
     write_csv(tmp_path / 'tap_net.csv', 'Mode,Com_Port,Listen_Port', ['Listen,7,/dev/ttyUSB0'])

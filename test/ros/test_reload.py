@@ -211,7 +211,7 @@ def test_place_that_is_no_longer_shared_is_free_for_another_line(
 
 def test_link_that_does_not_take_the_files_is_the_end(
         bench: Bench, monkeypatch: pytest.MonkeyPatch, capfd: Output) -> None:
-    monkeypatch.setattr(LinkThread, 'exchange', lambda *arguments: False)
+    monkeypatch.setattr(LinkThread, 'exchange', lambda *arguments, **others: False)
     bench.write_map(SPEED, RECIPE, LEVEL)
     assert bench.reload() == (False, 'ends: the link does not accept the new files')
     assert bench.node.has_failed

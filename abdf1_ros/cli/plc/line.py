@@ -51,7 +51,7 @@ def apart_from_target(network: Network, options: argparse.Namespace,
     """
     Return a line on which we have another address than the station that the options name.
 
-    A new address is none of ``others``, and not that of the gateway.
+    If we need a new address, no gateway and no station of ``others`` has that address.
     Raises ConfigurationError if a user gave us the address of that station.
     """
     if options.station != network.station:
