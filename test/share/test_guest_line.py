@@ -71,18 +71,18 @@ class Shared:
             'N10:10', 'Heartbeat', plc='SLC', period=200)]
         self.driver = Driver(network, rows, DriverSettings(), self.listener)
         name = self._line.name
-        self._near = LinkThread(self.driver.machine, lambda: open_port(PortSettings(name)))
+        self.near = LinkThread(self.driver.machine, lambda: open_port(PortSettings(name)))
         self.faults: list[Exception] = []
-        self.guests = [GuestLine(place, network, self.driver.guests, self._near.wake,
+        self.guests = [GuestLine(place, network, self.driver.guests, self.near.wake,
                                  GuestListener(), self.faults.append)
                        for place in share_places(places)]
 
     def start(self) -> None:
-        for thread in (self._far, self._near, *self.guests):
+        for thread in (self._far, self.near, *self.guests):
             thread.start()
 
     def stop(self) -> None:
-        for thread in (*self.guests, self._near, self._far):
+        for thread in (*self.guests, self.near, self._far):
             thread.stop()
         self._line.close()
 
@@ -94,7 +94,8 @@ def shared(folder: Path, places: str, access: str = 'Read',
     line = Shared(folder, places, access, mode)
     line.start()
     try:
-        wait_for(lambda: all(guest.state != 'not opened yet' for guest in line.guests))
+        wait_for(lambda: line.near.state.is_open and all(
+            guest.state != 'not opened yet' for guest in line.guests))
         yield line
     finally:
         line.stop()
