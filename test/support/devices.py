@@ -380,7 +380,7 @@ def packet_after_each_reply() -> Filter:
 
 @acts('MSG instructions in a slave: to us, to 0, to another slave, before each second reply', HALF)
 def messages_before_the_reply() -> tuple[Filter, Filter]:
-    numbers, to = itertools.count(0x1000), itertools.cycle((None, 0, 3, -1, -1))
+    numbers, to = itertools.count(0x1000), itertools.cycle((None, 0, 99, -1, -1))
     is_asked = False  # the next ACK is for a message
 
     def say(data: bytes) -> bytes:
