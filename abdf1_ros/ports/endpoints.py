@@ -227,7 +227,8 @@ def _close(ends: Iterable[int]) -> None:
 def _own(link: Path) -> socket.socket:
     """Reserve a link; raise OSError if this or another process has it."""
     try:
-        return own(link_of(str(link)))
+        # Not as a device: a program that looks for a missing device reserves its name meanwhile.
+        return own(f'link {link_of(str(link))}')
     except OSError:
         raise OSError(f'{link} is in use by another bridge, simulator or sniff') from None
 

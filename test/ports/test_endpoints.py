@@ -21,10 +21,12 @@ from pathlib import Path
 import socket
 import time
 
+from abdf1_ros.line_names import device_of
 from abdf1_ros.ports import endpoints
 from abdf1_ros.ports.descriptor import DescriptorPort, NoClient
 from abdf1_ros.ports.endpoints import PtyEndpoint, PtyPlace, PtyWire, SerialEndpoint, TcpEndpoint
 from abdf1_ros.ports.link_thread import Port
+from abdf1_ros.ports.ownership import own
 from abdf1_ros.ports.settings import PortSettings
 import pytest
 from support.counting import open_files
@@ -160,6 +162,11 @@ def test_name_that_cannot_be_had_leaves_no_terminal_open(
         kind(str(tmp_path / link))
     assert not open_files() - before
     assert sorted(os.listdir(tmp_path)) == ['adapter', 'loop', 'taken']
+
+
+def test_bridge_that_looks_for_a_port_does_not_keep_its_name_from_a_pty(tmp_path: Path) -> None:
+    with closing(own(device_of(f'{tmp_path}/plc'))):  # as at each attempt to open it
+        PtyEndpoint(f'{tmp_path}/plc').close()
 
 
 def test_link_is_one_however_it_is_written(tmp_path: Path) -> None:
