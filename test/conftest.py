@@ -31,7 +31,8 @@ from support.ptys import Pty
 # Files that wait for other processes most of the time, and files that compute; the longest first.
 _WAITING = (
     'cli/plc/test_detect.py', 'ros/test_process.py', 'faults/', 'cli/monitor/test_command.py',
-    'examples/', 'ros/', 'cli/plc/test_other_lines.py', 'test_docs', 'test_', 'cli/')
+    'examples/', 'ros/', 'cli/plc/test_other_lines.py', 'share/', 'lab/interop/', 'test_docs',
+    'test_', 'cli/', 'ports/')
 _COMPUTING = (
     'lab/simulate/', 'lab/noise/', 'df1/test_multidrop_line.py', 'lab/soak/',
     'driver/', 'df1/', 'lab/fuzz/', 'conform/', 'simulator/', 'sniffer/', 'tools/', 'plan/', '')
@@ -92,7 +93,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     waiting = _sorted([file for file in files if file.startswith(_WAITING)], _WAITING)
     computing = _sorted([file for file in files if not file.startswith(_WAITING)], _COMPUTING)
     place = {file: float(at) for at, file in enumerate(waiting)}
-    place.update((file, 2 * at + 1.5) for at, file in enumerate(computing))
+    place.update((file, 1.4 * at + 1.5) for at, file in enumerate(computing))
     items.sort(key=lambda item: place[names[item.path]])
 
 
