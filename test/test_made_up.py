@@ -96,6 +96,7 @@ assert 'did you mean speeds?' in said('spedes')
 """
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(('patch', 'program', 'most', 'where'), [
     ('settings/made_up_column.patch', UNSEEN, 3, ''), ('ros/made_up_command.patch', LOG, 10, ''),
     ('cli/plc/made_up_verb.patch', SPEEDS, 1, 'cli/plc/verbs/speeds.py')])

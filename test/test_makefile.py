@@ -78,6 +78,7 @@ ROOT = Path(__file__).resolve().parents[1]
 CRASHING = 'import os, signal\ndef test_crash():\n    os.kill(os.getpid(), signal.SIGKILL)\n'
 
 
+@pytest.mark.long
 def test_crashed_worker_ends_the_run_with_a_failure(tmp_path: Path) -> None:
     pytest.importorskip('xdist')
     recipe = re.search(r'-m pytest (-n \$\(TEST_WORKERS\).+?) \$\(PYTEST_ARGS\)',

@@ -73,6 +73,7 @@ def test_plugin_of_the_tutorial_is_that_of_the_example() -> None:
     assert line in (EXAMPLE / 'conftest.py').read_text(encoding='utf-8')
 
 
+@pytest.mark.long
 def test_example_is_collected_where_there_is_no_launch_testing() -> None:
     found = subprocess.run(
         [sys.executable, '-m', 'pytest', '--collect-only', '-q', 'examples/testing'], cwd=SOURCE,

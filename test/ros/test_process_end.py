@@ -168,6 +168,7 @@ def cost_to_make(process: Process, count: int) -> float:
     return float(seconds)
 
 
+@pytest.mark.long
 @pytest.mark.timeout(300)  # two of them begin at once, on a busy host
 def test_time_to_start_grows_with_the_rows_and_a_thousand_end_in_time(tmp_path: Path) -> None:
     file = patched(tmp_path, 'node', EARLY + COSTS)  # once: the other process may be reading it
