@@ -27,7 +27,7 @@ import re
 
 from abdf1_ros.pccc.address import Address, AddressRangeError, AddressSyntaxError, BITS
 from abdf1_ros.pccc.file_types import FileType
-from abdf1_ros.pccc.structures import whole_elements
+from abdf1_ros.pccc.structures import elements_text
 from abdf1_ros.pccc.values import types_of, ValueType
 
 _RANGE = re.compile(r'(?P<first>.+?)\s*(?:-|\.\.+|\s+TO\s+)\s*(?P<last>.+)', re.ASCII)
@@ -72,7 +72,7 @@ class AddressRange:
         if first.file_type is FileType.STRING and first != last:
             raise AddressSyntaxError(f'each string needs its own row: {self._each()}')
         if first.file_type.is_structure and not self.is_whole and first.element != last.element:
-            whole = whole_elements(first, last)
+            whole = elements_text(first, last)
             raise AddressSyntaxError(
                 f'{first} and {last} are not neighbours; a row each for {self._each()}'
                 f'{whole and f", or the whole elements with {whole}"}')

@@ -80,7 +80,7 @@ def type_fault(address: Address, kind: ValueType, length: int) -> str | None:
     return None
 
 
-def whole_elements(first: Address, last: Address) -> str:
+def elements_text(first: Address, last: Address) -> str:
     """Return how to name all words from element to element, empty if they have several types."""
     start = replace(first, word=0, bit=None)
     length = (last.element - start.element + 1) * start.layout.words

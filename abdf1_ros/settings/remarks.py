@@ -26,7 +26,7 @@ from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.plc5.address import USUAL_LAST_ELEMENT
 from abdf1_ros.pccc.processor import Processor, USUAL
-from abdf1_ros.pccc.structures import value_addresses, whole_elements
+from abdf1_ros.pccc.structures import elements_text, value_addresses
 from abdf1_ros.pccc.values import ValueType
 from abdf1_ros.problems import Problem
 from abdf1_ros.settings.columns import MAP_COLUMNS
@@ -174,7 +174,7 @@ def _useless_cells(row: Row, mapping: Mapping) -> Iterator[Problem]:
         yield _at(row, 'Address', f'{row.get("Address")} is the control word of the element; its '
                                   f'values are {", ".join(value_addresses(address))}')
     if control := _beyond_control(mapping):
-        whole = whole_elements(address, mapping.place_of(mapping.length - 1))
+        whole = elements_text(address, mapping.place_of(mapping.length - 1))
         yield _at(row, 'Length' if row.get('Length') else 'Address', (
             f'{mapping.length} words from {address} on are also the control word {control}'
             f'{whole and f"; whole elements are {whole}"}'))

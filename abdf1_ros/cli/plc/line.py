@@ -75,6 +75,7 @@ def network_of(options: argparse.Namespace, duplex: str | None = None,
     given = {column: (str(value), f'--{option.replace("_", "-")}')
              for option, column in _COLUMNS.items()
              if (value := getattr(options, option, None)) is not None}
+    is_told = 'timeout' in given
     if timeout is not None:
         given.setdefault('timeout', (timeout, '--timeout'))
     network = make_network(given, base)
@@ -93,5 +94,6 @@ def network_of(options: argparse.Namespace, duplex: str | None = None,
         raise ConfigurationError([Problem(
             '--via', f'{via} is our own Station, not a gateway; --own-station N changes ours')])
     # By radio there is no ACK, so --timeout limits the wait for the reply.
-    is_told = network.duplex is Duplex.RADIO and getattr(options, 'timeout', None) is not None
-    return replace(network, cmd_timeout=network.timeout) if is_told else network
+    if network.duplex is Duplex.RADIO and is_told:
+        return replace(network, cmd_timeout=network.timeout)
+    return network
