@@ -109,7 +109,7 @@ demo-peer: $(RUNS) ## The same on a full-duplex line
 .PHONY: test
 test: $(INSTALLED) $(COMPILED) ## Run the tests; PYTEST_ARGS='test/df1 -k poll' runs some
 	$(TEST_ENV) $(PY) -m pytest -n $(TEST_WORKERS) --dist loadfile \
-	    --no-loadscope-reorder --max-worker-restart 0 $(PYTEST_ARGS)
+	    --no-loadscope-reorder --max-worker-restart 0 --ignore test/style $(PYTEST_ARGS)
 
 # launch_ros asks for composition_interfaces, which has no wheel, for component containers alone.
 .PHONY: ros-tools
@@ -134,10 +134,11 @@ test-ros: $(INSTALLED) ## Run the tests that need these tools; what is missing f
 	    test/test_security_policy.py test/test_ament.py test/examples/test_recorder.py $(PYTEST_ARGS)
 
 .PHONY: lint
-lint: $(INSTALLED) ## Check style and types
+lint: $(INSTALLED) ## Check style, types and the rules of CONTRIBUTING.md
 	$(PY) -m ruff check .
 	$(PY) -m mypy
 	$(PY) -m tools.ament
+	$(TEST_ENV) $(PY) -m pytest --quiet test/style
 
 .PHONY: docs
 docs: $(INSTALLED) ## Write the parts of the documentation that repeat the code

@@ -15,8 +15,8 @@
 """
 The cause and the cure of each numbered message and counter.
 
-The same for each outcome of a write. docs/reference/ is made from this; test/test_reference.py
-fails if an entry is missing.
+The same for each outcome of a write. docs/reference/ is made from this;
+test/style/test_reference.py fails if an entry is missing.
 """
 
 from __future__ import annotations

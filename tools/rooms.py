@@ -15,7 +15,7 @@
 """
 The rooms of the package: their contents, and the imports that each may have.
 
-``test/test_layers.py`` enforces it; CONTRIBUTING.md and docs/architecture.md show it.
+``test/style/test_layers.py`` enforces it; CONTRIBUTING.md and docs/architecture.md show it.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator
 from fnmatch import fnmatch
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -125,8 +126,13 @@ def _statements(tree: ast.AST) -> Iterator[ast.AST]:
             yield from _statements(node)
 
 
-def imports(module: str, source: str) -> Iterator[str]:
-    """Yield the absolute dotted name of everything that ``module`` imports."""
+@cache
+def imports(module: str, source: str) -> tuple[str, ...]:
+    """Return the absolute dotted name of everything that ``module`` imports."""
+    return tuple(_imports(module, source))
+
+
+def _imports(module: str, source: str) -> Iterator[str]:
     for node in _statements(ast.parse(source)):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)

@@ -15,7 +15,6 @@
 """The arrows between the layers point one way, as the imports tell."""
 
 import ast
-from functools import cache
 import re
 import subprocess
 import sys
@@ -40,17 +39,11 @@ def _is_ros(top: str) -> bool:
     return top.startswith(('rclpy', 'diagnostic_updater')) or top.endswith(('_msgs', '_srvs'))
 
 
-@cache
-def _imports(module: str, source: str) -> list[str]:
-    """Return what a module imports; each is parsed once."""
-    return [*imports(module, source)]
-
-
 def violations(module: str, source: str) -> list[str]:
     """Return every import of ``module`` (a path inside the package) that breaks a rule."""
     found = []
     room = room_of(module)
-    for name in _imports(module, source):
+    for name in imports(module, source):
         top, _, inner = name.partition('.')
         if top == 'abdf1_ros':
             if not room.may_import(inner):
@@ -74,7 +67,7 @@ def test_imports_follow_the_arrows(module: str) -> None:
 def imported(module: str) -> set[str]:
     """Return what a module imports of the package, by dotted names."""
     source = (PACKAGE / module).read_text(encoding='utf-8')
-    return {name.removeprefix('abdf1_ros.') for name in _imports(module, source)
+    return {name.removeprefix('abdf1_ros.') for name in imports(module, source)
             if name.startswith('abdf1_ros.')}
 
 

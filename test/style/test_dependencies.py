@@ -24,7 +24,7 @@ from xml.etree import ElementTree
 import pytest
 from support.cases import for_all
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 MANIFEST = ElementTree.parse(ROOT / 'package.xml').getroot()
 KEYS = dict(line.split() for line in
             (ROOT / 'requirements' / 'rosdep.txt').read_text(encoding='utf-8').splitlines()
