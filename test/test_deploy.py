@@ -144,7 +144,8 @@ def test_unit_may_open_serial_ports_only(path: Path) -> None:
 
 
 @pytest.mark.parametrize(('path', 'command', 'file', 'section'), [
-    (UNIT, 'node', 'press.yaml', '/**'), (LINES_UNIT, 'lines', 'press.yaml', '/hall/line_1')],
+    (UNIT, 'node', 'press.yaml', '/**'), pytest.param(
+        LINES_UNIT, 'lines', 'press.yaml', '/hall/line_1', marks=pytest.mark.long)],
     ids=['line', 'lines'])
 def test_command_of_the_unit_starts_a_bridge_and_ends_by_its_signal(
         tmp_path: Path, path: Path, command: str, file: str, section: str) -> None:

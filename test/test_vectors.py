@@ -55,6 +55,7 @@ def test_verifier_shares_no_code_with_the_package() -> None:
     assert not re.search(r'^\s*(?:import|from) abdf1_ros', source, re.MULTILINE)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(('edit', 'fault'), [
     (lambda frame: frame.update(verdict='wrong check'), 'the verdict is good'),
     (lambda frame: frame.update(verdict='right'), "'right' is not one of"),
@@ -77,6 +78,7 @@ def test_wrong_frame_is_found(copy: Path, edit: Callable[[Any], object], fault: 
     assert any('slc_A2_N7_0_req_fd_crc' in text and fault in text for text in found)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(('field', 'value'), [
     ('reply', '05 01 41 00 02 04'), ('verdict', 'refused'),
     ('command', '01 05 01 10 01 04 04 00 04')])
@@ -85,6 +87,7 @@ def test_wrong_exchange_is_found(copy: Path, field: str, value: str) -> None:
     assert any(text.startswith('exchanges.json: plc2_read: ') for text in faults(copy))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(('number', 'change_of_line', 'fault'), [
     (1, {'says': 'reply'}, 'at 0 is command, not reply'), (2, {'at': 2000}, '0 comes too late'),
     (1, {'we': '10 05 11 EE'}, 'at 0 is damaged poll, not command'),

@@ -28,6 +28,7 @@ from support.cases import for_all
 from support.ros import Observer, Process
 
 
+@pytest.mark.long
 def test_others_on_the_network_are_not_taken_for_the_bridge() -> None:
     with Observer() as observer, Process('demo', '--peer', '--seconds', '0') as story:
         diagnostics = observer.node.create_publisher(DiagnosticArray, '/diagnostics', 10)

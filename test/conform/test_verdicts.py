@@ -296,7 +296,8 @@ def test_word_after_those_of_the_user_is_not_judged() -> None:
                                words=Words(7, 2, 1, 'SLC'))) == []
 
 
-@pytest.mark.parametrize('first', [0, pytest.param(1, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize('first', [0, 1])
 def test_what_is_allowed_is_no_fault(first: int) -> None:
     for number, (target, habit, names) in enumerate(ALLOWED, first):
         check = ('CRC', 'BCC')[number % 2]

@@ -325,7 +325,7 @@ def everybody(sender: int, receiver: int) -> bool:
 @pytest.mark.parametrize('count', [3, 5, 12])
 @pytest.mark.parametrize('loss', [0.0, 0.2])
 @pytest.mark.parametrize('avoids_collisions', [False, True])
-@pytest.mark.parametrize('seed', range(2))
+@pytest.mark.parametrize('seed', [0, pytest.param(1, marks=pytest.mark.long)])
 def test_nothing_is_executed_twice_nothing_is_wrong_and_everything_ends(
         reach: Callable[[int, int], bool], count: int, loss: float, avoids_collisions: bool,
         seed: int) -> None:
@@ -376,7 +376,7 @@ def test_nothing_is_executed_twice_nothing_is_wrong_and_everything_ends(
 
 @pytest.mark.parametrize('reach', [chain, everybody])
 @pytest.mark.parametrize('avoids_collisions', [False, True])
-@pytest.mark.parametrize('seed', range(2))
+@pytest.mark.parametrize('seed', [0, pytest.param(1, marks=pytest.mark.long)])
 def test_transaction_ends_within_its_bound_whatever_the_others_send(
         reach: Callable[[int, int], bool], avoids_collisions: bool, seed: int) -> None:
     random, retries = Random(seed), 2

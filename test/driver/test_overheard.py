@@ -420,7 +420,7 @@ def reads_of(capture: Capture) -> list[tuple[Place, bytes]]:
 
 
 @pytest.mark.parametrize('capture', long_unless(
-    lambda capture: 'plc5_bcc' not in capture.name, zip(CAPTURES)), ids=lambda case: case.name)
+    lambda capture: CAPTURES.index(capture) % 3 == 1, zip(CAPTURES)), ids=lambda case: case.name)
 def test_rows_have_what_recorded_programs_have_read(capture: Capture) -> None:
     reads = reads_of(capture)
     rows = {place: make_mapping(

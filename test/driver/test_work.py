@@ -57,6 +57,7 @@ def work_of_reads(condition: While | None, rows: int) -> int:
     return work
 
 
+@pytest.mark.long
 def test_guarded_rows_cost_little_more_than_others() -> None:
     plain = work_of_reads(None, ROWS)
     guarded = work_of_reads(While(('alive',), 500), ROWS)
@@ -89,6 +90,7 @@ def work_of_a_transaction(fallback: Fallback | None) -> float:
     return work / (bench.driver.tasks.transactions - before)
 
 
+@pytest.mark.long
 def test_transaction_costs_little_more_with_450_fallbacks() -> None:
     assert work_of_a_transaction(Fallback((7,), 60_000)) < 2 * work_of_a_transaction(None)
 

@@ -72,7 +72,8 @@ def start(stack: ExitStack, folder: Path, said: int, port: str, *program: str,
     return node
 
 
-@pytest.mark.parametrize('make', [unread_pipe, stopped_terminal])
+@pytest.mark.parametrize('make', [
+    unread_pipe, pytest.param(stopped_terminal, marks=pytest.mark.long)])
 def test_fallback_and_end_come_in_time_where_nothing_reads_the_log(
         make: Any, tmp_path: Path) -> None:
     with ExitStack() as stack:

@@ -238,7 +238,7 @@ def watched(cell: Cell, address: str,
     return values
 
 
-@pytest.mark.parametrize('answer', [NAK, b''])
+@pytest.mark.parametrize('answer', [pytest.param(NAK, marks=pytest.mark.long), b''])
 def test_rule_3_guests_command_that_the_plc_does_not_take_changes_no_heartbeat_and_no_read(
         tmp_path: Path, answer: bytes, capfd: Output) -> None:
     place = tmp_path / 'hmi'

@@ -67,7 +67,7 @@ def for_all(names: str | Sequence[str], items: Iterable[Any],
 
 def long_unless(is_quick: Callable[..., bool], cases: Iterable[tuple[Any, ...]],
                 ) -> list[ParameterSet]:
-    """Return cases for ``parametrize``; only "make long" runs those that are not quick."""
+    """Return cases for ``parametrize``; "make test" leaves out those that are not quick."""
     return [pytest.param(*case, marks=() if is_quick(*case) else pytest.mark.long)
             for case in cases]
 

@@ -34,19 +34,20 @@ from simulate.rules import (
 )
 from simulate.run import simulate, Story
 from simulate.steady import Steady
+from support.cases import long_unless
 from support.devices import DEVICES
 from support.losses import Losses, Lost
 from support.world import GUESTS, MODES, Plant, Said, Sent, STEP, World
 
 
-@pytest.mark.parametrize('mode', MODES)
+@pytest.mark.parametrize('mode', long_unless(lambda mode: 'ateway' not in mode, zip(MODES)))
 def test_a_new_plant_keeps_all_rules(mode: str) -> None:
     # A rule that does not hold names the seed: run.py --mode ... --turns 1 --plants 1 ...
     simulate(secrets.randbelow(10**9), lambda totals: totals.plants == 1, mode, 1,
              is_steady=mode in ('Message', 'Standard'))
 
 
-@pytest.mark.parametrize('mode', MODES)
+@pytest.mark.parametrize('mode', long_unless(lambda mode: mode in ('Slave', 'Peer'), zip(MODES)))
 def test_seed_replays_a_plant_to_the_byte(mode: str) -> None:
     def bytes_of_a_run() -> str:
         story = Story(1, mode)
