@@ -108,6 +108,13 @@ def test_reads_of_every_family(plc: str, text: str, cmd: int, asked: str, answer
     assert bench.values(mapping) == [values]
 
 
+def test_every_reply_of_long_traffic_fills_its_row() -> None:
+    bench = ListeningBench([mapping := row(length=100)])
+    for tns in range(42):
+        exchange(bench, tns, 'A2 C8 07 89 00 00', 100 * '05 00 ')
+    assert bench.values(mapping) == 42 * [100 * [5]]
+
+
 def test_two_ports_hear_full_duplex() -> None:
     mapping = row()
     bench = ListeningBench([mapping], has_two_ports=True)
