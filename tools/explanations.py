@@ -199,7 +199,8 @@ COUNTERS: dict[str, str] = {
 OUTCOMES: dict[Outcome, str] = {
     Outcome.WRITTEN: 'The PLC has confirmed it. Bits of an SLC without masked write (5/01, 5/02, '
                      'ML1000) are written `by reading the word and writing it back`, in three '
-                     'commands. Changes by the program in that word in between are lost.',
+                     'commands. Changes by the program or another PLC in that word in between are '
+                     'lost; writes of guests wait.',
     Outcome.STANDS: 'A row with [Write_Again](#values-that-need-not-be-written-again): the PLC '
                     'holds the value, so it is not written again. The times of the confirmation '
                     'and of the last read with the value follow.',

@@ -19,7 +19,8 @@ Heartbeats and fallbacks (``interlocks``) go first. A check or read has its turn
 ``OWN_IN_A_ROW`` of them, and after each of them to a silent station. Then there are three queues:
 
 - ``writes`` go first, but after ``MAX_WRITES_IN_A_ROW`` of their commands a check or read that is
-  due has its turn.
+  due has its turn. A word that is rewritten is read and written back without another turn between:
+  what a guest wrote meanwhile would be undone.
 - ``checks``, such as the question for a station's mode, go before the reads. After a check, all
   reads that were due when it began go before the next check. If rows depend on the modes of
   several stations, one read goes between two of these questions. Before a question is sent again,
@@ -48,6 +49,7 @@ from abdf1_ros.driver.interlocks.queue import Interlocks
 from abdf1_ros.driver.job_tasks import Job, JobTasks
 from abdf1_ros.driver.reads.silent import Reads
 from abdf1_ros.driver.writes.queue import WriteQueue
+from abdf1_ros.driver.writes.under_way import WriteJob
 from abdf1_ros.plan.bounds import OURS_BESIDE_GUESTS, OWN_IN_A_ROW
 
 MAX_WRITES_IN_A_ROW = 4
@@ -58,6 +60,10 @@ _is_own = attrgetter('is_own')
 # QUESTION_PERIOD seconds.
 _QUICK_QUESTIONS = 10
 QUESTION_PERIOD = 1.0
+
+
+def _is_rewriting(job: Job) -> bool:
+    return isinstance(job, WriteJob) and job.write.is_rewriting
 
 
 class _GuestShare:
@@ -194,6 +200,9 @@ class Agenda:
         return self._checks.find_due(now) and self._check(now, busy) or self.read(now, busy)
 
     def _usual(self, now: float, busy: Container[int]) -> Job | None:
+        if rewriting := self._tasks.continued(now, busy, _is_rewriting):
+            self._writes_in_a_row += 1
+            return rewriting
         has_writes = self._writes.waiting or self._tasks.waiting
         if has_writes and self._writes_in_a_row < MAX_WRITES_IN_A_ROW \
                 and (write := self._write(now, busy)):

@@ -219,9 +219,16 @@ class GuestQueue:
         return None
 
     def _first(self, busy: Container[int]) -> Guest | None:
-        """Return the first guest whose next command is not for a ``busy`` station."""
-        return next((guest for guest in self.waiting
-                     if self._station_of(guest.waiting[0].packet.dst) not in busy), None)
+        """
+        Return the first guest whose next command is not for a ``busy`` station.
+
+        A broadcast waits while a word is rewritten: it may write this word.
+        """
+        for guest in self.waiting:
+            station = self._station_of(guest.waiting[0].packet.dst)
+            if station not in busy and not (station == BROADCAST and self._record.is_rewriting):
+                return guest
+        return None
 
     def _claim(self, packet: Packet, station: int) -> Claim | None:
         """Record a command that may write; a read needs no record."""

@@ -239,6 +239,12 @@ class WriteRecord:
         """Tell whether no write of these words is under way: packets of writes must not mix."""
         return not any(claim.meets(row.extent) for claim in self._under_way)
 
+    @property
+    def is_rewriting(self) -> bool:
+        """Tell whether a write under way has read a word to write it back changed."""
+        return any(claim.write is not None and claim.write.is_rewriting
+                   for claim in self._under_way)
+
     def messages(self) -> Iterator[Write]:
         """Return the messages that are under way."""
         return (claim.write for claim in self._under_way

@@ -103,6 +103,7 @@ class Write:
     - ``value``: the values as text; ``raw``: the values for the PLC.
     - ``commands``: the requests that write them.
     - ``is_probe``: the station was silent when the write got the line.
+    - ``is_rewriting``: a word is read and then written back changed; no write may go between.
     - ``is_own``: a heartbeat or fallback, which no message has asked for.
     - ``origins``: the equal messages that it stands for, in their order.
     - ``oldest``, ``requested``: when the oldest and the youngest of them were published.
@@ -115,6 +116,7 @@ class Write:
         self.origins = [Origin(request, now)]
         self.requested = self.oldest = self.came = now
         self.is_probe, self.is_own = False, is_own
+        self.is_rewriting = False
         self.value = show(values)
         self.raw = raw_values(mapping, values)
         self.commands = self._usual = write_requests(

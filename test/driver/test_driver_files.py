@@ -17,13 +17,16 @@
 from collections.abc import Callable
 
 from abdf1_ros.df1.packet import Packet
+from abdf1_ros.driver.guests import ShareAccess
 from abdf1_ros.driver.write import Outcome
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.slc import commands as slc
 from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
-from support.driver_bench import DriverBench, store, stored
+import pytest
+from support.driver_bench import DriverBench, Program, store, stored
 from support.mappings import make_mapping
 
 
@@ -49,7 +52,7 @@ class OldPlc(SimulatedPlc):
     ``meanwhile`` is called with each function code before the command is carried out.
     """
 
-    meanwhile: Callable[[int], None] = staticmethod(lambda function: None)
+    meanwhile: Callable[[int], object] = staticmethod(lambda function: None)
 
     def serve(self, command: Packet) -> Packet:
         """Refuse what it does not know or take."""
@@ -62,9 +65,9 @@ class OldPlc(SimulatedPlc):
         return super().serve(command)
 
 
-def old_bench(mapping: Mapping) -> tuple[DriverBench, OldPlc]:
+def old_bench(mapping: Mapping, polling: str = 'Message') -> tuple[DriverBench, OldPlc]:
     """Return a bench with an old PLC on the line."""
-    bench = DriverBench([mapping])
+    bench = DriverBench([mapping], network=Network(baud=19200, timeout=200, polling=polling))
     table = DataTable(PlcType.SLC)
     plc = OldPlc(1, table, bench.network.checksum, bench.clock)
     for text, words in (('N7:0', 256), ('B3:0', 8)):
@@ -111,6 +114,17 @@ def test_change_between_reading_and_writing_back_is_lost_as_the_result_says() ->
         plc.faults, 'silent', function == slc.LOGICAL_READ)  # then nothing has been changed
     bench.write(mapping, [1], run=10.0)
     assert bench.listener.outcomes()[-1] is Outcome.NOT_SENT
+
+
+@pytest.mark.parametrize(('polling', 'dst'), [('Message', 1), ('Standard', 255)])
+def test_guests_write_goes_after_the_word_is_written_back(polling: str, dst: int) -> None:
+    mapping = make_mapping('B3:1/4', 'Write', plc='SLC', processor='5/01')
+    bench, plc = old_bench(mapping, polling)
+    bench.write(mapping, [1], run=0.5)  # of the next write only one packet goes before guests
+    program, two = Program(bench, ShareAccess.WRITE), bytes.fromhex('AA 02 03 85 01 00 02 00')
+    plc.meanwhile = lambda function: function == slc.LOGICAL_READ and program.ask(two, dst)
+    bench.write(mapping, [0], run=0.5)
+    assert (program.statuses, stored(plc, 'B3:1')) == ([0], b'\2\0')
 
 
 def test_flat_io_is_read_and_written_through_the_slots() -> None:

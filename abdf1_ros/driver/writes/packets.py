@@ -74,7 +74,11 @@ def _send(write: Write, packet: int) -> Steps[str]:
     except RemoteError as error:
         if error.sts != STS_ILLEGAL_COMMAND or not write.mapping.may_rewrite:
             raise
-        yield from _rewrite(write, packet, error)
+        write.is_rewriting = True
+        try:
+            yield from _rewrite(write, packet, error)
+        finally:
+            write.is_rewriting = False
         return REWRITTEN
     return ''
 
