@@ -50,6 +50,7 @@ class _Writer(Enum):
 
     MESSAGE = auto()
     OURS = auto()
+    NEIGHBOUR = auto()  # a row with other bits of a word that is written back as a whole
     GUEST = auto()
     GUEST_SOMEWHERE = auto()  # by a command whose effect is not known
     BEFORE = auto()  # any program that had the line before the port was opened
@@ -92,17 +93,24 @@ class Claim:
         """Return True if it has ended and may have changed words, now or later."""
         return -math.inf < self.lands_until < math.inf
 
+    @property
+    def may_restore(self) -> bool:
+        """Tell whether it has ended, and may land later with old values of bits beside its own."""
+        return self.write is not None and self.write.mapping.may_rewrite \
+            and self.done < self.lands_until < math.inf
+
     def meets(self, extent: Extent) -> bool:
         """Tell whether the write may change some of these words."""
         if self.extents is None:
             return self.station in (BROADCAST, extent.station)
         return any(extent.meets(other) for other in self.extents)
 
-    @property
-    def source(self) -> _Source:
-        """Return the writer, with the values if they are ours."""
+    def source(self, row: Mapping) -> _Source:
+        """Return who writes the words of a row, with the values if they are ours."""
         if self.write is None:
             return (_Writer.GUEST_SOMEWHERE if self.extents is None else _Writer.GUEST,)
+        if self.write.mapping is not row:
+            return (_Writer.NEIGHBOUR,)
         return (_Writer.OURS, *self.write.raw) if self.write.is_own else (_Writer.MESSAGE,)
 
 
@@ -149,12 +157,13 @@ class OwnWords:
 
     def ended(self, claim: Claim) -> None:
         """Record how a claim of these words ended."""
+        source = claim.source(self.row)
         if claim.has_changed:
-            self.may_land(claim.source, claim.lands_until)
-            if claim.source == (_Writer.GUEST,):
+            self.may_land(source, claim.lands_until)
+            if source == (_Writer.GUEST,):
                 self._guest_done = claim.done
         if claim.write is not None and claim.outcome is Outcome.WRITTEN:
-            self._stands = claim.source
+            self._stands = source
             if self._guest_done <= claim.begun:
                 self._guest_done = -math.inf
             self._lands_until = {source: until for source, until in self._lands_until.items()
@@ -273,8 +282,8 @@ class WriteRecord:
             listener.write_ended(claim)
 
     def _concerned(self, claim: Claim) -> Iterable[OwnWords]:
-        """Return the words of a claim's row, or for a guest all that it may have changed."""
-        if claim.write is not None:
+        """Return the words of a claim's row, or all that it may have changed."""
+        if claim.write is not None and not claim.may_restore:
             return filter(None, (self._words.get(claim.write.mapping),))
         return [words for row, words in self._words.items() if claim.meets(row.extent)]
 

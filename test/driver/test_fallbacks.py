@@ -98,6 +98,17 @@ def test_rule_10_write_that_may_land_after_the_begin_of_a_fallback_has_it_writte
     assert one.row.judge(begun + 1.0, -math.inf) is (again < math.inf)
 
 
+@pytest.mark.parametrize(('processor', 'again'), [('ML1000', 1.0), ('5/03', math.inf)])
+def test_rule_10_word_that_may_be_written_back_late_has_old_values_of_other_bits(
+        processor: str, again: float) -> None:
+    record, (row, other) = WriteRecord(StillClock(), 1.0), [make_mapping(
+        f'B3:0/{bit}', 'Write', plc='SLC', processor=processor) for bit in range(2)]
+    words, claim = record.words_of(row), record.begin(1, [other.extent], Write(other, [1], 0.0))
+    record.ended(claim, Outcome.UNKNOWN, may_land=True)
+    words.plan_again(0.5)
+    assert words.again_at == again
+
+
 def test_rule_11_only_the_first_try_over_a_guest_is_not_held_up_by_a_pause() -> None:
     row = (one := OneRow()).row
     row.make_due(FallbackCause.START, 0.0)

@@ -173,6 +173,18 @@ def test_neighbour_bits_do_not_disturb_each_other() -> None:
         5:] == [STANDS] * (len(line.listener.results) - 6)
 
 
+def test_word_that_may_be_written_back_late_disturbs_its_other_bits() -> None:
+    rows = [make_mapping(f'B3:0/{bit}', 'Write', plc='SLC', processor='5/01', write_again=1000)
+            for bit in range(2)]
+    standing, line = Standing(rows, 0.5), DriverBench([make_mapping('B3:0', plc='SLC')])
+    for row, outcome in zip(rows, (WRITTEN, Outcome.UNKNOWN), strict=True):
+        claim = Claim(1, [row.extent], Write(row, [1], 1.0), 1.0)
+        claim.end(outcome, 1.1, 0.0 if outcome is WRITTEN else 1.0)
+        standing.write_ended(claim)
+        standing.words_read(*line.driver.readings.blocks, b'\1\0', 1.2)
+        assert bool(standing.proof(Write(rows[0], [1], 1.3), 1.3)) is (outcome is WRITTEN)
+
+
 def test_unconfirmed_write_and_what_follows_prove_nothing() -> None:
     line = Line(WORD, READ)
     line.keep_saying(WORD, [7], 1.0)

@@ -90,7 +90,7 @@ class Standing(WriteListener):
 
     def _disturbed(self, claim: Claim) -> list[Mapping]:
         """Return the rows whose known value a write may replace by another value."""
-        if (write := claim.write) is None:
+        if (write := claim.write) is None or claim.may_restore:
             return [row for row in self._patience if claim.meets(row.extent)]
         sharing = self._sharing.get(write.mapping)
         if sharing is None:
