@@ -29,7 +29,8 @@ from abdf1_ros.driver.record import Claim, WriteRecord
 from abdf1_ros.driver.write import Outcome, Write
 from abdf1_ros.driver.writes.queue import WriteQueue
 from abdf1_ros.pccc.address import Address
-from abdf1_ros.pccc.emulated import Setting
+from abdf1_ros.pccc.emulated import EmulatedProcessor, Setting
+from abdf1_ros.pccc.identity import Mode
 from abdf1_ros.plan.bounds import MODE_PERIOD
 from abdf1_ros.settings.heartbeats import Fallback
 from abdf1_ros.settings.mapping import Mapping
@@ -277,6 +278,16 @@ def test_rule_8_change_to_run_is_a_first_contact(beats: tuple[Mapping, ...]) -> 
     contact = [('N10:0', 0), ('N7:0', 7), ('N10:0', 1)] if beats else [('N7:0', 7)]
     at = after.index(contact[0])
     assert after[at:at + len(contact)] == contact
+
+
+def test_rule_8_end_of_a_fault_is_a_change_to_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(EmulatedProcessor, 'mode', Mode.RUN)  # where the key stays meanwhile
+    cell, speed = speed_cell()
+    cell.publish(speed, 3, run=1.0)
+    for setting in (Setting.FAULT, Setting.RUN):
+        cell.plc.processor.setting = setting
+        cell.run(2 * MODE_PERIOD)
+    assert cell.results()[-1] == RUN
 
 
 def test_rule_8_change_to_run_while_a_fallback_is_under_way_has_it_written_again() -> None:
