@@ -92,7 +92,8 @@ def test_bridge_and_folder_end_with_a_demo_that_is_killed(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv('TMPDIR', str(tmp_path))
     with Observer() as observer, Process('demo', '--peer', '--seconds', '60') as story:
-        observer.until(lambda: 'abdf1' in observer.node.get_node_names(), lambda: story.text)
+        story.wait_for('2. ')
+        assert 'abdf1' in observer.node.get_node_names()
         children = Path(f'/proc/{story.number}/task/{story.number}/children')
         bridge = Path('/proc', children.read_text(encoding='ascii').split()[0], 'stat')
 
