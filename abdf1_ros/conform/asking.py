@@ -17,20 +17,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 
 from abdf1_ros.conform import codec
 from abdf1_ros.conform.case import case, Target
 from abdf1_ros.conform.codec import Symbol
-from abdf1_ros.conform.ends import AnsweringEnd, HIGHEST_LIMIT, PATIENCE
+from abdf1_ros.conform.ends import AnsweringEnd, expect_limit, is_as_late, PATIENCE
 from abdf1_ros.conform.wire import Failed, Skipped
 
 _ASKING = (Target.MASTER, Target.CLIENT, Target.RADIO_CLIENT)
 _ACKNOWLEDGED = (Target.MASTER, Target.CLIENT)
 
 _MOST_COMMANDS = 5
-# A case is judged only if a missing reply clearly delays the next command: to more than twice the
-# time with a reply, plus this time (s).
-_CLEARLY = 0.3
 
 
 @case('A command has DST, SRC, CMD, STS 00 and TNS, and the check covers what the manual says.',
@@ -58,14 +56,14 @@ def tns_differs(end: AnsweringEnd) -> None:
       Target.MASTER, Target.RADIO_CLIENT)
 def repetitions_limited(end: AnsweringEnd) -> None:
     header = end.next_command().data[:codec.HEADER_SIZE]
-    for _ in range(HIGHEST_LIMIT + 1):
-        try:
-            end.wire.until(lambda symbol: symbol.data[:codec.HEADER_SIZE] == header,
-                           'the command once more', PATIENCE)
-        except Failed:
-            return
-    raise Failed(f'the command given up after {HIGHEST_LIMIT} repetitions at the latest, the '
-                 'highest limit of the products', 'the command once more')
+
+    def comes() -> bool:
+        with suppress(Failed):
+            end.wire.until(lambda symbol: symbol.data[:codec.HEADER_SIZE] == header, '', PATIENCE)
+            return True
+        return False
+
+    expect_limit('the command again', comes)
 
 
 @case('A check byte of 10 is not doubled in a reply.', 'M 5-5', *_ASKING)
@@ -101,7 +99,7 @@ def expect_not_used(end: AnsweringEnd, *answers: Callable[[Symbol], None]) -> No
     """Give answers that are not replies: the next command must come as late as without a reply."""
     answered, command = _follows(end, end.next_command(), end.finish)
     unanswered, command = _follows(end, command, end.acknowledge)
-    if unanswered < 2 * answered + _CLEARLY or end.has_further:
+    if is_as_late(answered, unanswered) or end.has_further:
         raise Skipped('not judged: the next command comes as soon after no reply as after a reply')
     for answer in answers:
         for _ in range(2):  # so that the target does not count us as inactive

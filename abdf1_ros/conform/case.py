@@ -66,7 +66,7 @@ class End(Protocol):
         """Wait until the target has finished the work of the case before."""
 
     def check_target(self) -> None:
-        """Raise Skipped if the case has ended in silence, and the target does not answer."""
+        """Raise Skipped if the case has ended without an answer, and the target gives none."""
 
 
 CaseScript: TypeAlias = Callable[[Any], None]

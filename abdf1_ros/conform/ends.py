@@ -44,34 +44,47 @@ def ack_timeout(wire: Wire) -> float:
     return min(LONGEST_ACK_TIMEOUT, 1.5 * wire.enquired_after + 1.0)
 
 
+def expect_limit(what: str, comes: Callable[[], bool]) -> None:
+    """
+    Call ``comes`` until ``what`` does not come any more.
+
+    Raises Failed if that has no end, and Skipped if ``what`` does not come once.
+    """
+    for times in range(HIGHEST_LIMIT + 1):
+        if not comes():
+            if not times:
+                raise Skipped(f'not tried: {what} has not come')
+            return
+    raise Failed(f'an end after {HIGHEST_LIMIT} times at the latest, the highest limit of the '
+                 'products', f'{what} once more')
+
+
 def expect_end_of_naks(wire: Wire, message: bytes, patience: float) -> None:
-    """Refuse a message each time it comes; raise Failed if the target never gives it up."""
-    for _ in range(HIGHEST_LIMIT + 1):
+    """Refuse a message each time it comes, and expect an end of that."""
+    def comes() -> bool:
         wire.send(codec.NAK)
         symbol = wire.hear(patience)
-        if symbol is None or symbol.data != message:
-            return
-    raise Failed(f'the message given up after {HIGHEST_LIMIT} repetitions at the latest, the '
-                 'highest limit of the products', 'the message once more')
+        return symbol is not None and symbol.data == message
+
+    expect_limit('the message again', comes)
 
 
-def expect_end_of_enquiries(wire: Wire, patience: float,
-                            message: bytes | None = None) -> Symbol | None:
-    """
-    Leave DLE ENQ and ``message`` without an answer; return the next other symbol, None for none.
-
-    Raises Failed if the target does not stop sending them.
-    """
-    for _ in range(HIGHEST_LIMIT + 1):
+def expect_end_of_enquiries(wire: Wire, message: bytes, patience: float) -> None:
+    """Leave a message and DLE ENQ without an answer, and expect an end of them."""
+    def comes() -> bool:
         symbol = wire.hear(patience, answers=False)
-        if symbol is None or symbol.kind is not SymbolKind.ENQ and symbol.data != message:
-            return symbol
-    raise Failed(f'an end after {HIGHEST_LIMIT} DLE ENQ at the latest, the highest limit of the '
-                 'products', f'{symbol} once more')
+        return symbol is not None and (
+            symbol.kind is SymbolKind.ENQ or symbol.data == message)
+
+    expect_limit('DLE ENQ', comes)
 
 
 MOST_TRIES = 3  # tries to send to a full sink, and to answer a command before a case
 _MOST_COMMANDS = 20  # commands in a row that a slave sends by itself, or a master without a reply
+
+# A reply counts as taken only if a missing reply clearly delays the next command: to more than
+# twice the time with a reply, plus this time (s).
+_CLEARLY = 0.3
 
 # Longest time of a reply, in answer times.
 _REPLY_TIMES = 5
@@ -154,13 +167,14 @@ class AskingEnd(ABC):
         """Receive the messages that the target still has to send, before a case begins."""
 
     def check_target(self) -> None:
-        """Send a command if the case has ended in silence; raise Skipped if that goes on."""
+        """Send a command if the case has ended without an answer; Skipped if no reply comes."""
+        if not self.wire.is_unanswered:
+            return
         for _ in range(MOST_TRIES):
-            if self.wire.is_silent:
-                with suppress(Failed):
-                    self.carry_out(self.command())
-        if self.wire.is_silent:
-            raise Skipped('not tried: the target does not answer')
+            with suppress(Failed):
+                self.carry_out(self.command())
+                return
+        raise Skipped('not tried: the target answers no command')
 
     def frame(self, command: bytes) -> bytes:
         """Return the frame of a message."""
@@ -350,6 +364,11 @@ Serve = Callable[[bytes], bytes]
 """Executes a command: takes its link data, returns the link data of the reply."""
 
 
+def is_as_late(answered: float, unanswered: float) -> bool:
+    """Tell whether a missing reply does not clearly delay the next command (times in s)."""
+    return unanswered < 2 * answered + _CLEARLY
+
+
 class AnsweringEnd(ABC):
     """
     The common part of all ends that answer commands.
@@ -537,11 +556,21 @@ class RadioServerEnd(ServerEnd):
     def acknowledge(self, command: Symbol) -> None:
         pass
 
-    def expect_taken(self, command: Symbol) -> None:
-        symbol = self.next_command('another command')
+    def expect_taken(self, command: Symbol, within: float = PATIENCE) -> None:
+        """
+        Expect a new command, and nothing before it.
+
+        Raises Skipped if it comes after more than ``within`` s, or as late as without a reply.
+        """
+        begun = self.wire.now
+        symbol = self.expect(SymbolKind.MESSAGE, 'no symbol before the next command', PATIENCE)
         if symbol.data[4:6] == command.data[4:6]:
             raise Failed('a new command: this one has its reply', symbol.data.hex(' '))
-        self.finish(symbol)
+        answered = symbol.at - begun
+        following = self.next_command('another command')
+        if answered > within or is_as_late(answered, following.at - symbol.at):
+            raise Skipped('not judged: the next command comes too late after a reply')
+        self.finish(following)
 
     def finish(self, command: Symbol) -> None:
         self.reply_to(command)

@@ -119,19 +119,11 @@ def own_packet_dropped(end: RadioEnd) -> None:
         end.wire.expect_silence('it is a packet of its own', 2 * end.wire.answer_time)
 
 
-def _next_alone(end: RadioServerEnd, last: Symbol) -> None:
-    """Expect a new command, and nothing before it; answer it."""
-    symbol = end.expect(SymbolKind.MESSAGE, 'no symbol before the next command', PATIENCE)
-    if symbol.data[4:6] == last.data[4:6]:
-        raise Failed('a new command: this one has its reply', symbol.data.hex(' '))
-    end.finish(symbol)
-
-
 @case('A reply is taken without DLE ACK or any other response.', _RULES, _SENDER)
 def reply_taken(end: RadioServerEnd) -> None:
     command = end.next_command()
     end.finish(command)
-    _next_alone(end, command)
+    end.expect_taken(command)
 
 
 @case('A command without a reply gets no DLE ENQ. Sent again, it is as it was.', _RULES, _SENDER)
@@ -148,7 +140,7 @@ def _not_taken(end: RadioServerEnd, command: Symbol, *frames: bytes) -> None:
     Send frames before the reply to a command, then the reply.
 
     Before the reply the target may only forward frames that have the SRC of another node, and ask
-    another station.
+    another station. Raises Skipped if it also waits that long after the reply.
     """
     for frame in frames:
         end.wire.send(frame)
@@ -156,7 +148,7 @@ def _not_taken(end: RadioServerEnd, command: Symbol, *frames: bytes) -> None:
         if symbol.raw not in frames or symbol.data[1] == command.data[1]:
             raise Failed('silence: the reply has not come', str(symbol))
     end.finish(command)
-    _next_alone(end, command)
+    end.expect_taken(command, _MOMENT)
 
 
 @case('A reply with a wrong check is dropped in silence.', _RULES, _SENDER)
@@ -180,7 +172,7 @@ def duplicate_reply_ignored(end: RadioServerEnd) -> None:
     command = end.next_command()
     end.finish(command)
     end.finish(command)
-    _next_alone(end, command)
+    end.expect_taken(command)
 
 
 @case('A packet whose SRC is the number of the node comes back to it: it is dropped.',

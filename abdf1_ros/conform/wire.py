@@ -32,6 +32,8 @@ _LONGEST_FRAME = 1000  # bytes; twice the largest packet, if every byte of it is
 _MOST_UNREAD = 65536
 _QUIET = 0.2  # s without a byte
 _DLE = b'\x10'
+_NO_ANSWERS = (SymbolKind.NOISE, SymbolKind.NAK, SymbolKind.EOT)
+_NOT_TO_BE_TAKEN = (SymbolKind.ACK, SymbolKind.NAK, SymbolKind.POLL)
 
 # Longest time of restoring the words of the target, in answer times: a late reply, and then a
 # command with its reply.
@@ -139,13 +141,21 @@ class Wire:
         self.allow(limit)
 
     @property
-    def is_silent(self) -> bool:
-        """Tell whether no symbol has come since we last sent anything but a response."""
+    def is_unanswered(self) -> bool:
+        """
+        Tell whether neither DLE ACK nor a reply has come since we last sent anything to be taken.
+
+        That is anything but polls and responses. DLE EOT, DLE NAK and commands are no answers:
+        they come from a target that takes nothing, too.
+        """
         for entry in reversed(self.transcript):
-            if isinstance(entry, Sent) and entry.raw not in (codec.ACK, codec.NAK):
+            if isinstance(entry, Symbol):
+                if entry.kind not in _NO_ANSWERS and not codec.is_command(entry):
+                    break
+                continue
+            sent = codec.next_symbol(entry.raw, self.check, self.is_half_duplex)
+            if sent is None or sent.kind not in _NOT_TO_BE_TAKEN or not sent.is_good:
                 return True
-            if isinstance(entry, Symbol) and entry.kind is not SymbolKind.NOISE:
-                break
         return False
 
     def allow(self, seconds: float) -> None:

@@ -66,7 +66,8 @@ FAULTS = [(target, habit, name) for targets, habit, name in [
     (ALL, Habit.EXECUTES_BAD_CHECK, 'bad-check-not-executed'),
     (ALL, Habit.DOUBLES_CHECK, 'check-not-doubled'), (ALL, Habit.REPLY_WITHOUT_BIT, 'read-words'),
     (ALL, Habit.KEEPS_ADDRESSES, 'read-words'), (ALL, Habit.ADDS_BYTE_TO_ECHO, 'echo-sizes'),
-    (ALL, Habit.ALWAYS_STS, 'identity'), (ALL, Habit.WORDS_REVERSED, 'word-order'),
+    (ALL, Habit.ALWAYS_STS, 'identity'), (ALL, Habit.ALWAYS_STS, 'element-too-high'),
+    (ALL, Habit.WORDS_REVERSED, 'word-order'),
     (ALL, Habit.WRITES_FIRST_WORD_ONLY, 'write-and-read'),
     (ALL, Habit.READS_NEXT_WORD, 'write-and-read'), (ALL, Habit.BYTES_EXCHANGED, 'write-and-read'),
     (ALL, Habit.BIT_15_LOST, 'write-and-read'), (ALL, Habit.MASK_SETS_ONLY, 'masked-write'),
@@ -131,7 +132,6 @@ FAULTS = [(target, habit, name) for targets, habit, name in [
     ((Target.PEER,), Habit.ENQ_NOT_ANSWERED, 'enquiry-after-ack'),
     ((Target.PEER,), Habit.NO_REPETITION, 'reply-repeated-after-nak'),
     ((Target.PEER,), Habit.SILENCE_REPEATED, 'silence-is-enquired'),
-    ((Target.PEER,), Habit.SILENCE_REPEATED, 'enquiry-limit'),
     ((Target.PEER,), Habit.RESPONSE_IS_DATA, 'embedded-response'),
     ((Target.PEER,), Habit.RESPONSE_INSIDE_IGNORED, 'embedded-response'),
     ((Target.PEER,), Habit.DROPS_MESSAGE_AROUND, 'embedded-response'),
@@ -238,7 +238,7 @@ ALLOWED = [(target, habit, names) for targets, habit, names in [
     (RADIO, Habit.REPEATS_REPLY, set()),
     (RADIO, Habit.COUNTS_NOTHING, {'duplicate-executed-once'}),
     (RADIO, Habit.SENDS_ON, set()),
-    (SENDER, Habit.NO_REPETITION, set()),
+    (SENDER, Habit.NO_REPETITION, {'repetitions-limited'}),
     (SENDER, Habit.NEVER_GIVES_UP, {'repetitions-limited'}),  # in the time that a case has
     (SENDER, Habit.SENDS_ON, set()), (SENDER, Habit.POLLS_OTHERS, set()),
 ] for target in targets]
@@ -376,12 +376,25 @@ class Babble:
         self.sent += data
 
 
-@for_all('name', [
-    'bad-poll-ignored', 'other-station-ignored', 'crc-covers-station', 'broadcast-unanswered',
-    'full-is-silent', 'bad-check-ignored', 'short-message-ignored', 'poll-idle'])
-def test_rule_is_not_tried_where_nobody_is(name: str) -> None:
-    result, = results_of(Babble(), Target.SLAVE, 'CRC', only=name)
-    assert result.verdict is Verdict.SKIP
+@for_all(('target', 'habits', 'names'), [
+    (Target.SLAVE, None, 'poll-idle bad-poll-ignored other-station-ignored crc-covers-station '
+     'broadcast-unanswered full-is-silent bad-check-ignored short-message-ignored'),
+    (Target.SLAVE, [Habit.NO_ACK, Habit.SENDS_COMMANDS], 'crc-covers-station full-is-silent '
+     'broadcast-unanswered bad-check-ignored short-message-ignored'),
+    (Target.SLAVE, [Habit.DROPS_WHAT_IT_SENT], 'repetitions-limited nak-resets'),
+    (Target.PEER, [Habit.NO_ACK], 'bad-check-refused short-message-refused enquiry-after-nak'),
+    (Target.PEER, [Habit.WRITES_NOTHING], 'bad-check-not-executed'),
+    (Target.PEER, [Habit.NO_REPETITION], 'nak-limit'),
+    (Target.CLIENT, [Habit.NO_REPETITION], 'nak-limit'),
+    (Target.CLIENT, [Habit.ACK_TIMEOUT_OF_8], 'enquiry-limit'),
+    (Target.MASTER, [Habit.NO_REPETITION], 'repetitions-limited'),
+    (Target.RADIO_CLIENT, [Habit.SLOW], 'bad-reply-ignored other-reply-ignored')])
+def test_rule_is_not_tried_where_nothing_of_it_happens(
+        target: Target, habits: list[Habit] | None, names: str) -> None:
+    for name in names.split():
+        line = Babble() if habits is None else ENDS[target]('CRC', *habits)
+        result, = results_of(line, target, 'CRC', only=name)
+        assert result.verdict is Verdict.SKIP, name
 
 
 class TwoMasters:
