@@ -196,6 +196,10 @@ class Times:
             + sum(map(self._undisturbed, fallbacks)) + self._response_time
         return max(3 * period, period + wait)
 
+    def of_message(self, mapping: Mapping) -> float:
+        """Return the seconds of a message of a row alone on the line, with no frame lost."""
+        return _with_answers(self._written[mapping], self._response_time)
+
     @cached_property
     def end(self) -> float | None:
         """Return the seconds of an orderly end where no frame gets lost, None for no bound."""
@@ -315,9 +319,17 @@ def remarks(network: Network, mappings: Rows, blocks: Sequence[Block],
             if mapping.period < _SHORT_PERIOD:
                 yield (f'{mapping.tag}: a Period of {mapping.period} ms may be shorter than a '
                        'scan of the PLC, which then misses values')
-        if mapping.fallback is not None and not mapping.serves \
-                and mapping.fallback.after / 1000 < 2 * longest:
-            yield (f'{mapping.tag}: Fallback_After {mapping.fallback.after} ms is shorter than '
+        if mapping.fallback is None or mapping.serves:
+            continue
+        after = mapping.fallback.after / 1000
+        write = times.of_message(mapping)
+        if after < write:
+            # A message may have to wait for the one before it.
+            yield (f'{mapping.tag}: Fallback_After {milliseconds(after)} is shorter than a write '
+                   f'of all its words, {milliseconds(write)}, so the fallback comes in the middle '
+                   f'of each message; {milliseconds(2 * max(write, longest))} would be enough')
+        elif after < 2 * longest:
+            yield (f'{mapping.tag}: Fallback_After {milliseconds(after)} is shorter than '
                    f'two transactions of {milliseconds(longest)}; a few lost frames bring the '
                    'fallback')
     yield from _late_states(network, mappings, response_time)

@@ -255,6 +255,10 @@ def test_rule_16_transactions_longer_than_period_or_fallback_after_are_warned_of
     assert 'one transaction may take 8380 ms' in of_beat
     assert 'its Period is 1000 ms' in of_beat
     assert 'Fallback_After 3000 ms is shorter than two transactions' in of_speed
+    long = [make_mapping('N7:0', 'Write', length=1000, fallback=Fallback((0,) * 1000, after))
+            for after in (1490, 1500)]
+    (cut,) = [text for text in remarks(QUICK, Rows(long), ()) if 'a write of all its' in text]
+    assert ' 1490 ms ' in cut and cut.endswith('; 2988 ms would be enough')
 
 
 def plant(stations: int, rows: int) -> list[Mapping]:
