@@ -127,7 +127,22 @@ class PtyEndpoint:
             self._lock.close()
 
 
-class PtyPlace(PtyEndpoint):
+class _ShowingPty(PtyEndpoint):
+    """A pseudo-terminal that shows whether a program has opened the far end."""
+
+    def _make(self) -> None:
+        super()._make()
+        os.close(self._ends.pop())
+
+    @property
+    def is_idle(self) -> bool:
+        """Tell whether no program has opened the far end."""
+        hangs_up = select.poll()
+        hangs_up.register(self._ours, 0)
+        return bool(hangs_up.poll(0))
+
+
+class PtyPlace(_ShowingPty):
     """
     A pseudo-terminal for one program at a time.
 
@@ -136,15 +151,9 @@ class PtyPlace(PtyEndpoint):
     takes the name.
     """
 
-    def _make(self) -> None:
-        super()._make()
-        os.close(self._ends.pop())  # so that our end shows when no program has opened the far end
-        self._hangs_up = select.poll()
-        self._hangs_up.register(self._ours, 0)
-
     def open(self) -> Port:  # noqa: A003
         """Return our end if a program has opened the far end; raise NoClient otherwise."""
-        if self._hangs_up.poll(0):
+        if self.is_idle:
             try:
                 self._forget()
             except OSError:
@@ -166,48 +175,52 @@ class PtyPlace(PtyEndpoint):
         self.drop_unread()
 
 
-class PtyWire(PtyEndpoint):
+class PtyWire(_ShowingPty):
     """
     A pseudo-terminal as a wire: bytes that no program takes are lost.
 
-    A wire that ``is_awaited`` cannot be opened before a first program has opened the far end.
+    A wire that ``is_awaited`` cannot be opened before a first program has opened the far end. If a
+    program has kept the terminal for itself (TIOCEXCL), another terminal takes the name.
     """
 
     def __init__(self, link: str | None, *, is_awaited: bool = False) -> None:
         super().__init__(link)
         self._is_awaited = is_awaited
-        os.close(self._ends.pop())  # so that a read shows when no program has opened the far end
 
     def open(self) -> Port:  # noqa: A003
         """Return our end, which stays open while programs come and go; may raise NoClient."""
-        descriptor = os.dup(self._ours)
-        port = _WirePort(descriptor, lambda: os.close(descriptor), self.drop_unread)
-        if self._is_awaited and port.is_idle:
-            port.close()
+        if self._is_awaited and self.is_idle:
             raise NoClient
-        return port
+        descriptor = os.dup(self._ours)
+        return _WirePort(descriptor, lambda: os.close(descriptor), self)
+
+    def forget(self, descriptor: int) -> None:
+        """Drop the bytes that no program has read; ``descriptor`` may get a new far end."""
+        try:
+            self.drop_unread()
+        except OSError:
+            if not self.is_idle:  # a program has come and keeps others out
+                return
+            if self._link is None:  # nobody would find another terminal
+                raise OSError(f'a program keeps {self.name} for itself; with pty:NAME another '
+                              'terminal would take the name') from None
+            self._make()
+            os.set_blocking(self._ours, False)
+            os.dup2(self._ours, descriptor, inheritable=False)
 
 
 class _WirePort(DescriptorPort):
-    """Our end of a wire; ``drop`` drops the bytes that a program has not read before its end."""
+    """Our end of a ``wire``."""
 
-    def __init__(self, descriptor: int, close: Callable[[], None],
-                 drop: Callable[[], None]) -> None:
+    def __init__(self, descriptor: int, close: Callable[[], None], wire: PtyWire) -> None:
         super().__init__(descriptor, close)
-        self._drop = drop
-        self._hangs_up = select.poll()
-        self._hangs_up.register(descriptor, 0)
-
-    @property
-    def is_idle(self) -> bool:
-        """Tell whether no program has opened the far end."""
-        return bool(self._hangs_up.poll(0))
+        self._wire = wire
 
     def read(self, timeout: float | None, wake: int) -> bytes:
         try:
             return super().read(timeout, wake)
         except OSError:  # no program has opened the far end
-            self._drop()
+            self._wire.forget(self._descriptor)
         pause = select.poll()
         pause.register(wake, select.POLLIN)
         pause.poll(_PAUSE if timeout is None else min(timeout * 1000, _PAUSE))
@@ -215,7 +228,7 @@ class _WirePort(DescriptorPort):
 
     def write(self, data: bytes) -> None:
         with suppress(BlockingIOError):
-            if not self.is_idle:
+            if not self._wire.is_idle:
                 os.write(self._descriptor, data)
 
 

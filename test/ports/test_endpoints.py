@@ -119,6 +119,21 @@ def test_wire_loses_what_no_program_takes(tmp_path: Path, wake: int) -> None:
             assert port.read(PATIENCE, wake) == b'last'
 
 
+def test_wire_that_a_program_keeps_for_itself_for_ever_is_made_again(
+        tmp_path: Path, wake: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    name = str(tmp_path / 'plc')
+    with closing(PtyWire(name)) as line, closing(line.open()) as port:
+        before = os.readlink(name)
+        with monkeypatch.context() as patch:  # as above
+            patch.setattr(line, 'drop_unread', partial(os.open, '/none', 0))
+            with open(name, 'wb'):
+                line.forget(-1)  # too late: the next program is here
+                assert os.readlink(name) == before
+            assert port.read(0.0, wake) == b''
+        exchange(port, os.open(name, os.O_RDWR | os.O_NOCTTY), wake)
+        assert os.readlink(name) != before
+
+
 def test_wire_may_wait_for_its_first_program(tmp_path: Path) -> None:
     with closing(PtyWire(str(tmp_path / 'plc'), is_awaited=True)) as line:
         with pytest.raises(NoClient):
