@@ -15,7 +15,7 @@
 
 """What holds for all tests: the examples of property tests, and which files begin."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 import gc
 import os
@@ -23,6 +23,8 @@ from pathlib import Path
 from typing import Any
 
 from abdf1_ros.cli.plc.detect import LineSettings
+from abdf1_ros.ports.clock import line_time
+from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.settings.network import Network
 from hypothesis import HealthCheck, settings
 import pytest
@@ -78,6 +80,16 @@ def half_duplex_only(monkeypatch: pytest.MonkeyPatch) -> None:
         return replace(network, timeout=50, cmd_timeout=50) if settings.mode == 'Peer' else network
 
     monkeypatch.setattr(LineSettings, 'on', brief)
+
+
+@pytest.fixture
+def leap(monkeypatch: pytest.MonkeyPatch) -> Callable[[float], None]:
+    """Let the clock of all links go forward by some seconds, so that a Timeout takes no time."""
+    ahead = [0.0]
+    defaults = LinkThread.__init__.__kwdefaults__
+    monkeypatch.setitem(defaults, 'clock', lambda: line_time() + sum(ahead))
+    monkeypatch.setitem(defaults, 'longest_wait', 0.01)  # until a link sees it
+    return ahead.append
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

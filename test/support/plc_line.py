@@ -28,10 +28,14 @@ from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.ports.descriptor import Port, PortAround
 from abdf1_ros.ports.endpoints import PtyEndpoint
 from abdf1_ros.ports.link_thread import LinkThread
+from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.gateway import stations_of
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 from support.odd_device import OddDevice
 from support.ptys import Pty
+
+Leap = Callable[[float], None]
+LOSSY = Network(timeout=30_000)  # on which no host stands still for too long
 
 
 @contextmanager
@@ -84,17 +88,18 @@ def odd_line(path: Path, device: OddDevice) -> Iterator[str]:
 
 
 class LosesPolls(PortAround):
-    """A line on which the first poll of each of ``stations`` gets lost."""
+    """A line that loses a poll of each of ``stations``, as often as named; its Timeout is over."""
 
-    def __init__(self, port: Port, stations: set[int]) -> None:
+    def __init__(self, port: Port, stations: list[int], leap: Leap) -> None:
         super().__init__(port)
-        self._stations = stations
+        self._stations, self._leap = stations, leap
 
     def read(self, timeout: float | None, wake: int) -> bytes:
         data = super().read(timeout, wake)
-        for station in [*self._stations]:
+        for station in {*self._stations}:
             at = data.find(bytes((0x10, 0x05, station)))  # an ACK may stand before it
             if at >= 0:
                 self._stations.remove(station)
+                self._leap(LOSSY.timeout / 1000)
                 return data[:at] + data[at + 4:]
         return data

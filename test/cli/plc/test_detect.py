@@ -16,6 +16,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 import os
 from pathlib import Path
 import re
@@ -42,7 +43,7 @@ from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 import pytest
 from support.driver_bench import simulated_plc
 from support.odd_device import Answer, OddDevice, Wiring
-from support.plc_line import LosesPolls, machine_line, odd_line, plc_line
+from support.plc_line import Leap, LosesPolls, LOSSY, machine_line, odd_line, plc_line
 from support.ptys import Pty
 
 
@@ -113,11 +114,11 @@ def test_search_ends_with_the_first_answer(tmp_path: Path, duplex: Duplex, check
 
 
 @pytest.mark.usefixtures('half_duplex_only')
-def test_lost_poll_is_no_reason_to_find_nothing(tmp_path: Path) -> None:
+def test_lost_poll_is_no_reason_to_find_nothing(tmp_path: Path, leap: Leap) -> None:
     trying = Trying()
     plc = simulated_plc(1, 'SLC', lambda: 0.0)
-    with plc_line(tmp_path / 'line', plc, around=lambda port: LosesPolls(port, {1})) as name:
-        found = Search(Network(com_port=name, timeout=1000), [1], trying).run([9600])
+    with plc_line(tmp_path / 'line', plc, around=lambda port: LosesPolls(port, [1], leap)) as name:
+        found = Search(replace(LOSSY, com_port=name), [1], trying).run([9600])
     assert found is not None and found.settings == LineSettings(9600, 'Master', 'CRC')
     assert trying[-1] == '9600 baud, half duplex, CRC, station 1'
 

@@ -44,7 +44,7 @@ from support.commands import Output
 from support.driver_bench import simulated_plc, store, stored
 from support.mappings import cell_of
 from support.odd_device import OddDevice, Wiring
-from support.plc_line import LosesPolls, odd_line, plc_line
+from support.plc_line import Leap, LosesPolls, LOSSY, odd_line, plc_line
 from support.ptys import no_file_longer_than
 
 PATIENT = ('--timeout', '2000', '--duplex', 'half')  # ms; a busy host may be late
@@ -185,11 +185,13 @@ def test_plc_that_falls_silent_after_it_was_found(
 
 
 @pytest.mark.usefixtures('half_duplex_only')
-def test_lost_poll_leaves_no_station_out(tmp_path: Path, capsys: Output) -> None:
+def test_lost_poll_leaves_no_station_out(tmp_path: Path, capsys: Output, leap: Leap) -> None:
     plcs = [simulated_plc(number, 'SLC', time.monotonic, *SLC) for number in (1, 2)]
-    with plc_line(tmp_path / 'plc', *plcs, around=lambda port: LosesPolls(port, {2})) as name:
+    with plc_line(tmp_path / 'plc', *plcs,
+                  around=lambda port: LosesPolls(port, [2] + 99 * [3], leap)) as name:
         assert main(['init', '--port', name, '--into', str(tmp_path), '--baud', '19200',
-                     '--stations', '1-3', *PATIENT]) == 0
+                     '--stations', '1-3', '--duplex', 'half',
+                     '--timeout', f'{LOSSY.timeout}']) == 0
     said = capsys.readouterr().out
     assert '2 of 3 stations answer; silent stations were asked 3 times\n' in said
     assert 'station 1: SLC 5/03' in said

@@ -14,6 +14,7 @@
 
 """Who is there: what is shown of a station, and what to look at when there is none."""
 
+from dataclasses import replace
 from pathlib import Path
 import threading
 import time
@@ -41,7 +42,7 @@ from abdf1_ros.simulator.gateway import SimulatedGateway
 import pytest
 from support.driver_bench import FarEnd, simulated_plc
 from support.odd_device import OddDevice, Wiring
-from support.plc_line import LosesPolls, machine_line, odd_line, plc_line
+from support.plc_line import Leap, LosesPolls, LOSSY, machine_line, odd_line, plc_line
 from support.ptys import Pty
 
 IDENTITY = Identity(
@@ -203,11 +204,12 @@ def test_scan_in_full_duplex_does_not_count_what_a_gateway_refuses(tmp_path: Pat
     assert [seen.is_there for seen in found] == [True, False, False]
 
 
-def test_scan_asks_silent_stations_again(tmp_path: Path) -> None:
+def test_scan_asks_silent_stations_again(tmp_path: Path, leap: Leap) -> None:
     plcs = [simulated_plc(1, 'SLC', time.monotonic), simulated_plc(2, 'SLC', time.monotonic)]
-    with plc_line(tmp_path / 'line', *plcs, around=lambda port: LosesPolls(port, {2})) as name:
+    with plc_line(tmp_path / 'line', *plcs,
+                  around=lambda port: LosesPolls(port, [2], leap)) as name:
         shown: list[str] = []
-        found = list(scan(Network(com_port=name, timeout=1000), [1, 2], show=shown.append))
+        found = list(scan(replace(LOSSY, com_port=name), [1, 2], show=shown.append))
     assert [(there.station, there.is_there, there.asked) for there in found] == [
         (1, True, 1), (2, True, 2)]
     assert shown == ['station 1 of 2', 'station 2 of 2', 'station 1 of 1, asked 2 times']
