@@ -70,7 +70,7 @@ from abdf1_ros.driver.writes.standing import Standing
 from abdf1_ros.driver.writes.under_way import WritesUnderWay
 from abdf1_ros.errors import FormatError, INTERNAL_ERROR, PortLost
 from abdf1_ros.messages import Event
-from abdf1_ros.pccc.extent import Extent
+from abdf1_ros.pccc.extent import Extent, OUR_TABLE
 from abdf1_ros.pccc.families import served_counters
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity
@@ -324,7 +324,7 @@ class Driver:
             else:
                 self.served.store(write.mapping, write.raw)
                 self._record.ended(self._record.begin(
-                    write.mapping.station, (write.mapping.extent,), write), Outcome.WRITTEN)
+                    OUR_TABLE, (write.mapping.extent,), write), Outcome.WRITTEN)
                 self._end_write(write, Outcome.WRITTEN)
 
     def _leave_out(self, write: Write, now: float) -> str:

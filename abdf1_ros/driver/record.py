@@ -28,7 +28,6 @@ from enum import auto, Enum
 import math
 from typing import Protocol
 
-from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.job_tasks import LineTime
 from abdf1_ros.driver.write import Outcome, Write
@@ -66,7 +65,7 @@ class Claim:
 
     Times are clock values (s).
 
-    - ``station``: may be BROADCAST.
+    - ``station``: may be BROADCAST or OUR_TABLE.
     - ``extents``: its words, None if unknown: any words of the station.
     - ``write``: the write of a message or of the bridge itself, None for a guest.
     - ``begun``, ``done``: when it got the line, and when it ended.
@@ -102,7 +101,7 @@ class Claim:
     def meets(self, extent: Extent) -> bool:
         """Tell whether the write may change some of these words."""
         if self.extents is None:
-            return self.station in (BROADCAST, extent.station)
+            return extent.may_be_in(self.station)
         return any(extent.meets(other) for other in self.extents)
 
     def source(self, row: Mapping) -> _Source:
@@ -239,7 +238,7 @@ class WriteRecord:
         behind = {station.number for station in stations if station.has_gateway}
         until = self.line.now + self._settle_time
         for words in self._words.values():
-            if words.row.station in behind:
+            if words.row.extent.station in behind:
                 words.may_land((_Writer.BEFORE,), until)
         for listener in self._listeners:
             listener.opened(behind, until)

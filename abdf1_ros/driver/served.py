@@ -23,7 +23,7 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.pccc.address import Address, Area
 from abdf1_ros.pccc.data_table import DataTable, OutOfRange, Protected
 from abdf1_ros.pccc.emulated import EmulatedProcessor
-from abdf1_ros.pccc.extent import Extent
+from abdf1_ros.pccc.extent import Extent, OUR_TABLE
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.link_counters import ServedCounters
 from abdf1_ros.pccc.server import Server
@@ -132,7 +132,7 @@ class Served:
             table.take_back()  # all or nothing
         for mapping in self._mappings:
             if any(mapping.extent.meets(Extent(
-                    mapping.station, address.area, address.offset,
+                    OUR_TABLE, address.area, address.offset,
                     address.offset + len(before) // 2)) for address, before in table.changed):
                 self._on_write(mapping, self.words_of(mapping))
         return reply

@@ -21,13 +21,16 @@ from dataclasses import dataclass
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.pccc.address import Area
 
+OUR_TABLE = -1
+"""The station of the words of our own table, whatever number a PLC has."""
+
 
 @dataclass(frozen=True, slots=True)
 class Extent:
     """
     The words from ``first`` up to, not including, ``end`` of an area of a station.
 
-    If the station is the broadcast address, the words are in every station.
+    If the station is the broadcast address, the words are in every station, not in our own table.
     """
 
     station: int
@@ -38,7 +41,12 @@ class Extent:
     def meets(self, other: Extent) -> bool:
         """Tell whether both have a word in common."""
         return self.first < other.end and other.first < self.end and self.area == other.area \
-            and (self.station == other.station or BROADCAST in (self.station, other.station))
+            and self.may_be_in(other.station)
+
+    def may_be_in(self, station: int) -> bool:
+        """Tell whether the words may be in a station, or for the broadcast address in any."""
+        stations = self.station, station
+        return self.station == station or BROADCAST in stations and OUR_TABLE not in stations
 
     def holds(self, other: Extent) -> bool:
         """Tell whether all words of ``other`` are in this one."""

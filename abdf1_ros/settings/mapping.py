@@ -20,11 +20,10 @@ from dataclasses import dataclass, field
 from enum import Enum
 import math
 
-from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address, BITS
 from abdf1_ros.pccc.dialect import Dialect
-from abdf1_ros.pccc.extent import Extent
+from abdf1_ros.pccc.extent import Extent, OUR_TABLE
 from abdf1_ros.pccc.families import dialect_of, parse_address
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.processor import CIF_FILES, Processor
@@ -131,7 +130,8 @@ class Mapping:
         object.__setattr__(self, 'dialect', dialect_of(self.plc_type, self.access, self.processor))
         first = self.address.offset
         object.__setattr__(self, 'extent', Extent(
-            self.station, self.address.area, first, first + codec.words))
+            OUR_TABLE if self.serves else self.station, self.address.area, first,
+            first + codec.words))
 
     @property
     def target(self) -> AddressedValues:
@@ -238,8 +238,7 @@ class Mapping:
 
         A broadcast has the words of every station.
         """
-        if self.serves != other.serves or self.station != other.station \
-                and BROADCAST not in (self.station, other.station):
+        if not self.extent.may_be_in(other.extent.station):
             return False
         # If the rows count words in different ways, it is unknown which words they share.
         return any(not mine.counts_like(theirs) or self._meets(other)

@@ -45,6 +45,7 @@ from support.interlocks import (
     Cell,
     end,
     FALLBACK,
+    GuestCell,
     Line,
     RUN,
     speed_cell,
@@ -781,12 +782,15 @@ def test_rule_7_old_message_of_a_serve_row_is_not_stored() -> None:
     assert bench.listener.results[-1].outcome is Outcome.NOT_SENT
 
 
-def test_rule_12_fallback_of_a_serve_row_goes_into_our_own_table() -> None:
-    served = make_mapping('N9:0', 'Serve', station=5, fallback=FALLBACK)
-    cell = Cell(served, run=0.1)
+@pytest.mark.parametrize(('ours', 'theirs'), [(5, 255), (1, 1)])
+def test_rule_12_fallback_of_a_serve_row_goes_into_our_own_table(ours: int, theirs: int) -> None:
+    served = make_mapping('N7:0', 'Serve', station=ours, fallback=FALLBACK)
+    cell = GuestCell(served, make_mapping('N7:0', 'Write', station=theirs), run=0.1)
     words = cell.bench.driver.served.words_of
     assert words(served) == b'\7\0'
-    cell.publish(served, 3, run=0.3)
+    cell.publish(served, 3, run=0.2)
+    cell.ask('N7:0', 99, theirs)  # words of a PLC with the same address
+    cell.run(0.1)
     assert words(served) == b'\3\0'
     cell.run(0.3)
     assert words(served) == b'\7\0'

@@ -39,12 +39,12 @@ from abdf1_ros.driver.write import Outcome, Write, WriteResult
 from abdf1_ros.driver.writes.queue import WriteQueue
 from abdf1_ros.driver.writes.under_way import WriteJob, WritesUnderWay
 from abdf1_ros.errors import RemoteError
+from abdf1_ros.pccc.extent import OUR_TABLE
 from abdf1_ros.plan.planner import Block
 from abdf1_ros.settings.heartbeats import LAST_ANSWER
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.rows import Rows
 
-_OURS = -1  # means our own table
 _due_of, _refresh_due_of = attrgetter('due'), attrgetter('refresh_due')
 
 
@@ -74,13 +74,13 @@ class Interlocks(WriteListener):
                           for mapping in mappings.fallbacks]
         self.conditions = Conditions()
         rows: list[OwnRow] = [*self.heartbeats, *self.fallbacks]
-        stations_of = {row: _OURS if row.mapping.serves else row.mapping.station for row in rows}
+        stations_of = {row: row.mapping.extent.station for row in rows}
         self.plcs = {number: Plc(
             number, [row for row in rows if stations_of[row] == number], writing.stations, record,
             self.conditions)
-            for number in dict.fromkeys((_OURS, *stations_of.values()))}
+            for number in dict.fromkeys((OUR_TABLE, *stations_of.values()))}
         self._plc_of = {row: self.plcs[number] for row, number in stations_of.items()}
-        self.ours = self.plcs.pop(_OURS)
+        self.ours = self.plcs.pop(OUR_TABLE)
         self._by_mapping = {row.mapping: row for row in self.fallbacks}
         self._row_of = {row.mapping: row for row in rows}
         self._writes = writes

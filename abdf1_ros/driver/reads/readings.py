@@ -299,7 +299,8 @@ class Readings:
         """
         if self._stations[station].replies_in_time:
             return points
-        return [point for mapping, point in self.points.items() if mapping.station == station
+        return [point for mapping, point in self.points.items()
+                if mapping.extent.station == station
                 and (point in points or not mapping.is_on_demand)]
 
     def station_lost(self, station: int) -> None:
