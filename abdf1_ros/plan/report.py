@@ -311,7 +311,7 @@ def _station_remarks(network: Network, rows: Sequence[Mapping]) -> Iterator[Rema
         if station == network.station and not network.line_mode.only_listens:
             yield Remark(RemarkKind.STATION, (
                 f'station {station} of {_tags(mappings)} is our own Station in the net file; '
-                'two nodes of one address cannot communicate'), station)
+                'a PLC may refuse commands from its own number'), station)
         types: dict[str, list[Mapping]] = {}
         for mapping in mappings:
             if mapping.access is Access.CIF:

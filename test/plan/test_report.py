@@ -231,7 +231,7 @@ def test_our_own_station_is_mapped() -> None:
     mapping = make_mapping('N7:0', station=5, tag='speed')
     assert report_of(mapping).remarks() == [Remark(RemarkKind.STATION, (
         'station 5 of speed is our own Station in the net file; '
-        'two nodes of one address cannot communicate'), 5)]
+        'a PLC may refuse commands from its own number'), 5)]
     assert texts(report_of(mapping, station=6), RemarkKind.STATION) == []
 
 
