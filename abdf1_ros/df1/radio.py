@@ -330,11 +330,17 @@ class RadioNode(EqualNode):
             command.is_doubtful = True
 
     def _take_command(self, command: Packet) -> None:
-        """Execute a command once; when it is repeated, send its reply again."""
+        """
+        Execute a command once; when it is repeated, send its reply again.
+
+        It is a repetition if it equals the last command with its TNS. A sender that uses one TNS
+        for all its commands so gets each command executed that differs from the one before it.
+        """
         now, executed = self._machine.now, self._executed[command.src]
-        known = next((entry for entry in executed if entry.command == command
-                      and now - entry.when < self._repetition_time), None)
-        if known is not None:
+        known = next((entry for entry in reversed(executed)
+                      if entry.command.tns == command.tns), None)
+        if known is not None and known.command == command \
+                and now - known.when < self._repetition_time:
             self._counters.duplicate_messages += 1
             # A forwarded packet comes soon after the original packet; a repetition comes later.
             if now - known.answered > self._settings.cmd_timeout / 2:

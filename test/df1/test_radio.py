@@ -175,6 +175,8 @@ def test_sender_that_always_counts_zero_is_served_after_a_while() -> None:
         assert bench.executed == {(PLC, 0): 1 + (count - 1) // 20}
     bench.hear(framed(THEIRS._replace(tns=0, data=b'\x67\x02')))  # another command
     assert bench.executed == {(PLC, 0): 5}
+    bench.hear(framed(THEIRS._replace(tns=0)))  # not the last command of this TNS any more
+    assert bench.executed == {(PLC, 0): 6}
 
 
 def test_command_for_which_there_is_no_room_is_not_executed() -> None:
