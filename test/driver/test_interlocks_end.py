@@ -190,6 +190,16 @@ def test_rule_5_last_try_at_a_silent_plc_is_short(ends: bool, answer_within: flo
     assert job is not None and (job.is_free, job.answer_within) == (True, answer_within)
 
 
+def test_rule_5_silent_plc_is_not_due_at_the_end_while_another_has_not_answered() -> None:
+    rows = speed_row(), make_mapping('N7:0', 'Write', station=2, fallback=FALLBACK)
+    driver = Cell(*rows, start=False).bench.driver
+    driver.interlocks.begin(0.0)
+    driver.stations.lost(2, 0.0)
+    driver.interlocks.wind_down()
+    assert [job and job.station for job in map(driver.interlocks.next, (0.0, 0.0))] == [1, None]
+    assert driver.interlocks.next_due() == math.inf
+
+
 def test_rule_5_what_was_not_confirmed_at_the_end_is_named() -> None:
     cell = Cell(beat_row(), speed_row(), start=False)
     assert cell.bench.driver.interlocks.unconfirmed() == ['beat']

@@ -243,9 +243,7 @@ class Interlocks(WriteListener):
         """Return the next own write, None for none; ``only_active``: not for silent PLCs."""
         self.expire(now)
         if self.conditions.are_all_due:
-            # Silent PLCs have no later chance, but PLCs that answer go first.
-            only_active |= any(row.is_under_way and plc.is_active
-                               for row, plc in self._plc_of.items())
+            only_active |= self._waits_for_active
             self._writing.stations.probes.keep_none_waiting(now)
         if now < min(map(_due_of, self.plcs.values()), default=math.inf):
             return None
@@ -262,6 +260,16 @@ class Interlocks(WriteListener):
         if best is None or youngest is None:
             return None
         return self._begin(best[1], best[2], youngest, now)
+
+    @property
+    def _waits_for_active(self) -> bool:
+        """
+        Tell whether silent PLCs have to wait for the reply of a PLC that answers: it is the end.
+
+        They have no later chance, but PLCs that answer go first.
+        """
+        return self.conditions.are_all_due and any(
+            row.is_under_way and plc.is_active for row, plc in self._plc_of.items())
 
     def _begin(self, plc: Plc, row: OwnRow, youngest: dict[Mapping, float],
                now: float) -> WriteJob:
@@ -357,7 +365,8 @@ class Interlocks(WriteListener):
 
     def next_due(self) -> float:
         """Return when the next write is due (clock value in s), infinite for never."""
-        due = math.inf
+        due, only_active = math.inf, self._waits_for_active
         for plc in self.plcs.values():
-            due = plc.next_due(due)
+            if not only_active or plc.is_active:
+                due = plc.next_due(due)
         return due
