@@ -283,7 +283,8 @@ def test_faulty_value_is_a_problem_that_says_what_would_be_right(
 
 
 def test_all_problems_are_told_together(make_node: Nodes, files: Files) -> None:
-    write_csv(Path(files['map_file']), MAP_HEADER, ['recipe,Rad,N7:10,2,SLC,4,0,999'])
+    write_csv(Path(files['map_file']), MAP_HEADER, [
+        'recipe,Rad,N7:10,2,SLC,4,0,999', 'good_unless_we_are_5,Read,N7:0,5,SLC,,,'])
     found = problems_of(make_node(files | {
         'default_period': -1, 'strict_map': True, 'net.station': 255, 'net.baud': 0}))
     assert [problem.split(': ')[0] for problem in found] == [

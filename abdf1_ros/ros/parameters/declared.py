@@ -241,25 +241,27 @@ def read_again(before: Configuration) -> Configuration:
 
 def _from_files(given: Given, parameters: Parameters, problems: list[Problem], *,
                 is_strict: bool) -> Configuration:
-    network = Network()
+    found: Network | None = None
     mappings = Rows()
     map_problems: list[Problem] = []
     files = FileWatch((parameters.net_file, parameters.map_file))
     try:
-        network = _overridden(
+        found = _overridden(
             given, load_network(_needed('net_file', parameters.net_file, problems)))
     except ConfigurationError as error:
         problems += error.problems
     try:
         map_file = _needed('map_file', parameters.map_file, problems)
         mappings, map_problems = load_mappings(map_file)
-        mappings, unusable = usable_rows(mappings, network, parameters.default_period / 1000)
-        map_problems += unusable
+        if found is not None:  # the rows cannot be judged by a line that is not known
+            mappings, unusable = usable_rows(mappings, found, parameters.default_period / 1000)
+            map_problems += unusable
     except ConfigurationError as error:
         problems += error.problems
     if is_strict:
         problems += map_problems
     polling = _polling(parameters, mappings, problems)
+    network = found or Network()
     port = network.port
     if parameters.port:
         try:
