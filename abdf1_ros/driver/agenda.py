@@ -16,7 +16,8 @@
 The one place that decides which job has the line next.
 
 Heartbeats and fallbacks (``interlocks``) go first. A check or read has its turn after
-``OWN_IN_A_ROW`` of them, and after each of them to a silent station. Then there are three queues:
+``OWN_IN_A_ROW`` of them, and after each of them to a silent station, but not at the end. Then
+there are three queues:
 
 - ``writes`` go first, but after ``MAX_WRITES_IN_A_ROW`` of their commands a check or read that is
   due has its turn. A word that is rewritten is read and written back without another turn between:
@@ -173,7 +174,8 @@ class Agenda:
 
     def _own_first(self, now: float, busy: Container[int]) -> Job | None:
         """Return the next job: own writes first, not counted as ``writes`` in a row (rule 11)."""
-        if self._interlocks.is_ending:  # no value that is read now would be used
+        if self._interlocks.is_ending:
+            # A read of a PLC that fails now could take all the time that is left (rule 5).
             self._own_in_a_row, self._was_silent = 0, False
         if self._own_in_a_row >= OWN_IN_A_ROW and (job := self._check_or_read(now, busy)):
             self._own_in_a_row = 0
