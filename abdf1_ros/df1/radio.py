@@ -330,20 +330,12 @@ class RadioNode(EqualNode):
             command.is_doubtful = True
 
     def _take_command(self, command: Packet) -> None:
-        """
-        Execute a command once; when it is repeated, send its reply again.
-
-        It is a repetition if it equals the last command with its TNS. A sender that uses one TNS
-        for all its commands so gets each command executed that differs from the one before it.
-        """
+        """Execute a command once; when it is repeated, send its reply again."""
         now, executed = self._machine.now, self._executed[command.src]
-        known = next((entry for entry in reversed(executed)
-                      if entry.command.tns == command.tns), None)
-        if known is not None and known.command == command \
-                and now - known.when < self._repetition_time:
+        known = self._repeated(command, now)
+        if known is not None:
             self._counters.duplicate_messages += 1
-            # A forwarded packet comes soon after the original packet; a repetition comes later.
-            if now - known.answered > self._settings.cmd_timeout / 2:
+            if not self._may_be_forwarded(known, now):
                 known.answered = now
                 self._answer(known.reply)
         elif self._is_full:
@@ -354,6 +346,27 @@ class RadioNode(EqualNode):
             executed.append(_Executed(
                 command, now, now, None if command.dst == BROADCAST else reply))
             self._answer(executed[-1].reply)
+
+    def _repeated(self, command: Packet, now: float) -> _Executed | None:
+        """
+        Return the command that ``command`` repeats, None if it is a new one.
+
+        A sender repeats only its last command with a TNS, so one that uses one TNS for all its
+        commands gets each command executed that differs from the one before it. A forwarded packet
+        may come after the next command.
+        """
+        last: _Executed | None = None
+        for known in reversed(self._executed[command.src]):
+            if known.command.tns == command.tns:
+                last = last or known
+                if known.command == command and now - known.when < self._repetition_time and (
+                        known is last or self._may_be_forwarded(known, now)):
+                    return known
+        return None
+
+    def _may_be_forwarded(self, known: _Executed, now: float) -> bool:
+        """Tell whether a copy of a command comes too soon for a repetition by its sender."""
+        return now - known.answered <= self._settings.cmd_timeout / 2
 
     def _answer(self, reply: Packet | None) -> None:
         if reply is not None:
