@@ -157,8 +157,9 @@ class PtyPlace(_ShowingPty):
             try:
                 self._forget()
             except OSError:
-                # The last program has set TIOCEXCL, which lasts as long as this terminal.
-                self._make()
+                # A program has set TIOCEXCL, which lasts as long as this terminal.
+                if self.is_idle:  # not the next program, which has come just now
+                    self._make()
             raise NoClient
         descriptor = os.dup(self._ours)
 
@@ -201,7 +202,7 @@ class PtyWire(_ShowingPty):
         except OSError:
             if not self.is_idle:  # a program has come and keeps others out
                 return
-            if self._link is None:  # nobody would find another terminal
+            if self._link is None:  # no program would find the new terminal
                 raise OSError(f'a program keeps {self.name} for itself; with pty:NAME another '
                               'terminal would take the name') from None
             self._make()
