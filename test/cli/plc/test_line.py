@@ -222,7 +222,7 @@ def test_list_of_stations_has_ranges_and_numbers() -> None:
 
 
 @for_all('args', [
-    ('scan', ''), ('scan', '300'), ('ping', '1-2'), ('ping', '1', '--count', '-1'),
+    ('scan', ''), ('scan', '1,300'), ('ping', '1-2'), ('ping', '1', '--count', '-1'),
     ('watch', 'N7:0', '--period', '-1'), ('watch', 'N7:0', '--period', 'nan'),
     ('watch', 'N7:0', '--count', '1.5'), ('watch', 'N7:0', '--count', '\u0661'),
     ('watch', 'N7:0', '--period', '1_0'), ('ping', '\u0661'),
