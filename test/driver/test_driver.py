@@ -200,15 +200,18 @@ def test_read_goes_on_after_the_driver_itself_has_failed() -> None:
 
 def test_points_have_failed_when_the_port_is_lost_and_the_first_read_is_published() -> None:
     mapping, slow = make_mapping('N7:0', publish='Change'), make_mapping('F8:0', period=60_000)
-    own = make_mapping('N9:0', 'Serve', station=0)
+    own = make_mapping('N9:0', 'Serve', station=0, publish='Change')
     bench, _ = make_bench(mapping, slow, own, run=1.0)
+    bench.driver.readings.served(own, bytes(2))
     bench.lose_port('unplugged')
     point = bench.driver.points[mapping]
     assert (point.freshness(bench.clock()), point.error) == (
         Freshness.FAILED, 'port lost: unplugged')
     assert bench.driver.points[own].error is None  # its words are here
     bench.open(run=1.0)
-    assert bench.listener.values(mapping) == bench.listener.values(slow) == [[0], [0]]
+    bench.driver.readings.served(own, bytes(2))
+    for row in (mapping, slow, own):
+        assert bench.listener.values(row) == [[0], [0]]
 
 
 def test_every_write_ends_once_on_a_line_that_fails_in_every_way() -> None:

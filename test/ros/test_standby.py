@@ -203,13 +203,14 @@ def test_line_of_a_device_server_is_ours_when_any_station_has_answered_since_it_
     # a station comes while the first table is published, maybe after that of the other thread
     around.active_stations.publish.side_effect = lambda table: setattr(
         stations.words, 'return_value', [7])
-    vars(session).update(_surroundings=around, _port_text='', events=events,
+    vars(session).update(_surroundings=around, _port_text='', events=events, reads=Mock(latest={}),
                          driver=Mock(stations=stations), configuration=Mock(port=port))
     for is_open in (True, False, True):
         around.link.state = PortState(is_open, str(is_open))
         for _ in range(2):
             session.port_changed(around.link.state)
         assert session.has_line is (is_open and has_line)
+        session.reads.latest['speed'] = [1]
     tables = around.active_stations.publish.call_args_list
     assert [call.args[0].data[0] for call in tables] == [6, 7, 0, 7]  # none without a port
     assert events.port_changed.call_count == 3  # late replies are no errors
@@ -218,6 +219,9 @@ def test_line_of_a_device_server_is_ours_when_any_station_has_answered_since_it_
         for level, is_open in (('info', True), ('error', False), ('info', True))]
     session.begin_end()
     assert around.link.wake.called  # the last commands do not wait for the next poll
+    around.is_offered, around.results.waiting = False, ['fallback']
+    session.port_changed(PortState(False, 'lost while it waits'))
+    assert not session.reads.latest and not around.results.waiting
 
 
 def test_change_that_waits_for_the_executor_is_not_begun_again_before_it_ends() -> None:

@@ -64,6 +64,10 @@ class _Changes:
         self._published, self._published_at = values, now
         return False
 
+    def forget(self) -> None:
+        """Let the next values count as changed."""
+        self._published = None
+
     def _is_change(self, values: Values) -> bool:
         """Tell whether any value differs from the published one by more than the deadband."""
         before = self._published
@@ -145,6 +149,11 @@ class ReadPoint:
         self.raw = values  # before its time, which other threads look at first
         self.last_good, self.error, self.withheld = now, None, ''
         return None if is_same else self._published(values)
+
+    def forget_published(self) -> None:
+        """Publish the next value even if it has not changed: the topic may be a new one."""
+        if self._changes is not None:
+            self._changes.forget()
 
     @property
     def values(self) -> Values | None:

@@ -315,6 +315,8 @@ class Readings:
         for job in self.reads.jobs:
             job.interrupted()
         _fail_periodic((point for point in self.points.values() if point.mapping.polls), reason)
+        for point in self.points.values():
+            point.forget_published()
 
 
 def _fail_periodic(points: Iterable[ReadPoint], reason: str) -> None:

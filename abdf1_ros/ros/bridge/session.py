@@ -276,6 +276,8 @@ class BridgeSession:
             return  # the attempt has failed for the same reason as the last one
         self._port_text = state.text
         self._is_ours, self._opened = False, line_time()
+        if not state.is_open:
+            self._forget_connection()
         self.events.port_changed()
         self._publish_active()
         # a spare does not log this: a device server may accept and close its connection every
@@ -286,6 +288,12 @@ class BridgeSession:
         notes = self.events.notes
         tell = notes.info if is_meant else notes.error
         tell('the port', f'{self.port}: {state.text}')
+
+    def _forget_connection(self) -> None:
+        """Drop what waits to be published: a spare may get the line hours later."""
+        self.reads.latest.clear()
+        if self.is_waiting:
+            self._surroundings.results.waiting.clear()
 
     def check(self) -> None:
         """Publish diagnostics if due or if a level has changed; end calls that wait no longer."""

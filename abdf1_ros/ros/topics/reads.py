@@ -73,7 +73,7 @@ class ReadTopics:
 
     At a reload, call ``open`` before the new driver runs, and ``take_over`` after the old driver
     has stopped. Publishers of the old map (``published``) are used again where they fit.
-    ``latest``: the last values, by topic.
+    ``latest``: the last values of this connection, by topic.
     """
 
     def __init__(self, node: Node, published: dict[str, ReadTopic]) -> None:
