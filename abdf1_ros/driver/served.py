@@ -146,6 +146,11 @@ class Served:
         mapping.codec.store(self.table, _first_word(mapping), values)
         self.table.changed.clear()  # our own writes are not reported
 
+    def clear(self) -> None:
+        """Set all words to 0."""
+        for words in self.table.words.values():
+            words[:] = bytes(len(words))
+
     def take_over(self, before: Served) -> None:
         """Store what was served before, of the bits that both have a row for."""
         theirs = before._bits()

@@ -785,7 +785,8 @@ def test_rule_7_old_message_of_a_serve_row_is_not_stored() -> None:
 @pytest.mark.parametrize(('ours', 'theirs'), [(5, 255), (1, 1)])
 def test_rule_12_fallback_of_a_serve_row_goes_into_our_own_table(ours: int, theirs: int) -> None:
     served = make_mapping('N7:0', 'Serve', station=ours, fallback=FALLBACK)
-    cell = GuestCell(served, make_mapping('N7:0', 'Write', station=theirs), run=0.1)
+    plain = make_mapping('N7:1', 'Serve', station=ours)
+    cell = GuestCell(served, plain, make_mapping('N7:0', 'Write', station=theirs), run=0.1)
     words = cell.bench.driver.served.words_of
     assert words(served) == b'\7\0'
     cell.publish(served, 3, run=0.2)
@@ -795,6 +796,10 @@ def test_rule_12_fallback_of_a_serve_row_goes_into_our_own_table(ours: int, thei
     cell.run(0.3)
     assert words(served) == b'\7\0'
     assert cell.results() == [START, 'written', TIMEOUT]
+    for row in (served, plain):
+        cell.publish(row, 3)
+    cell.bench.driver.interlocks.forget_served()
+    assert words(served) + words(plain) == b'\7\0\0\0'
 
 
 def test_rule_17_fallback_has_one_result_and_its_retries_have_none() -> None:

@@ -204,7 +204,8 @@ def test_line_of_a_device_server_is_ours_when_any_station_has_answered_since_it_
     around.active_stations.publish.side_effect = lambda table: setattr(
         stations.words, 'return_value', [7])
     vars(session).update(_surroundings=around, _port_text='', events=events, reads=Mock(latest={}),
-                         driver=Mock(stations=stations), configuration=Mock(port=port))
+                         driver=Mock(stations=stations), configuration=Mock(
+                             port=port, **{'parameters.standby': has_line}))
     for is_open in (True, False, True):
         around.link.state = PortState(is_open, str(is_open))
         for _ in range(2):
@@ -222,6 +223,7 @@ def test_line_of_a_device_server_is_ours_when_any_station_has_answered_since_it_
     around.is_offered, around.results.waiting = False, ['fallback']
     session.port_changed(PortState(False, 'lost while it waits'))
     assert not session.reads.latest and not around.results.waiting
+    assert session.driver.interlocks.forget_served.called is has_line
 
 
 def test_change_that_waits_for_the_executor_is_not_begun_again_before_it_ends() -> None:

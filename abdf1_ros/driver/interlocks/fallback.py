@@ -26,6 +26,7 @@ import math
 from abdf1_ros.driver.record import Claim, OwnWords
 from abdf1_ros.driver.write import Outcome, Write
 from abdf1_ros.settings.heartbeats import LEAST_REFRESH
+from abdf1_ros.settings.limits import raw_values
 
 # Seconds after which a refused fallback value is written again.
 _PAUSE_AFTER_REFUSAL = 1.0
@@ -64,6 +65,7 @@ class FallbackRow:
     - ``has_failed``: the last message of the row that had the line was not confirmed.
     - ``refusal``: why the last write of the fallback was not confirmed.
     - ``words``: the writes that may change these words.
+    - ``raw``: the fallback as the PLC gets it.
     """
 
     def __init__(self, words: OwnWords) -> None:
@@ -86,6 +88,7 @@ class FallbackRow:
         self._counts_from = -math.inf
         self.has_failed = False
         self._values = mapping.fallback.values
+        self.raw = raw_values(mapping, self._values)
         self._due_since = 0.0
         self._next_try = -math.inf
         # when to write it again, as a change may not have been seen (rule 8)

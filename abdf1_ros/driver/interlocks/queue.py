@@ -150,6 +150,12 @@ class Interlocks(WriteListener):
             plc.contact(now, is_new=True)
         self.ours.plan()
 
+    def forget_served(self) -> None:
+        """Serve 0, or the fallback of a row: other bridges may take messages from now on."""
+        self._served.clear()
+        for row in self.ours.fallbacks:
+            self._served.store(row.mapping, row.raw)
+
     def contact(self, station: int, now: float) -> None:
         """Begin a first contact with a station that is active again (rules 2, 8)."""
         if self._has_begun and station in self.plcs:

@@ -290,8 +290,10 @@ class BridgeSession:
         tell('the port', f'{self.port}: {state.text}')
 
     def _forget_connection(self) -> None:
-        """Drop what waits to be published: a spare may get the line hours later."""
+        """Drop old values and results: a bridge may get the line again hours later."""
         self.reads.latest.clear()
+        if self.configuration.parameters.standby:
+            self.driver.interlocks.forget_served()
         if self.is_waiting:
             self._surroundings.results.waiting.clear()
 
