@@ -287,13 +287,14 @@ def test_line_is_handed_over_in_order(bench: Bench, monkeypatch: pytest.MonkeyPa
     for owner, name, text in (
             (BridgeSession, 'begin_end', 'tell the PLCs'),
             (BridgeSession, 'wait_for_plcs', 'wait for them'),
-            (BridgeSession, '__init__', 'make the new'), (LinkThread, 'exchange', 'exchange'),
+            (BridgeSession, '__init__', 'make the new'), (LineView, 'attach', 'know the port'),
+            (LinkThread, 'exchange', 'exchange'),
             (BridgeSession, 'end', 'end the old'), (BridgeSession, 'begin', 'begin the new'),
             (GuestPlaces, 'start', 'guests'), (ShownFiles, 'show', 'parameters')):
         record(owner, name, text)
     assert bench.reload()[0]
-    assert calls == ['tell the PLCs', 'wait for them', 'make the new', 'exchange', 'end the old',
-                     'begin the new', 'guests', 'parameters']
+    assert calls == ['tell the PLCs', 'wait for them', 'make the new', 'know the port', 'exchange',
+                     'end the old', 'begin the new', 'guests', 'parameters']
 
 
 def test_other_node_of_our_name_stays_known(bench: Bench) -> None:

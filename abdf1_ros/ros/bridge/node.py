@@ -132,6 +132,7 @@ class BridgeNode(AnsweringNode):
             self.session.driver.machine, self._opener.open,
             on_state=self._port_changed, on_fault=self._fault,
             while_sending=self.session.reads.publish_later_values)
+        self.session.diagnostics.line.attach(self.link, self._opener)
         self.session.begin()
 
     @property
@@ -236,7 +237,8 @@ class BridgeNode(AnsweringNode):
                 for wanted in (False, True):
                     self.set_polling(SetBool.Request(data=wanted), SetBool.Response())
             raise
-        self.session = session
+        session.diagnostics.line.attach(self.link, self._opener)
+        self.session = session  # from now on, ``check`` judges its statuses
         self.writes.give_to(session.writers)
         if not self.link.exchange(session.driver.machine, session.reads.publish_later_values,
                                   self._opener.use(_port_settings(configuration),

@@ -217,7 +217,6 @@ class BridgeSession:
         # Load remarks first, because dozens of setting remarks may follow.
         _tell_remarks(logger, [*self._plan().load_remarks(), *setting_remarks(
             configuration.network, configuration.mappings)])
-        self.diagnostics.line.attach(self._surroundings.link, self._surroundings.opener)
         self.reads.take_over()
         # with a closed port, port_changed publishes the table after the first attempt to open it
         if self._surroundings.link.state.is_open:
