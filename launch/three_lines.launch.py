@@ -23,7 +23,7 @@ launch.
 
 import sys
 
-from abdf1_ros.ros.launching import scope_of, unknown_arguments
+from abdf1_ros.ros.launching import parameter_types, scope_of, unknown_arguments
 from launch import LaunchContext, LaunchDescription
 from launch.actions import (
     DeclareLaunchArgument,
@@ -50,8 +50,10 @@ FAULTY = 2
 def line(namespace: str) -> GroupAction:
     """Return one bridge, in a scope of its own: its arguments do not reach the next bridge."""
     bridge = PathJoinSubstitution([ThisLaunchFileDir(), 'bridge.launch.py'])
-    arguments = {'namespace': namespace, 'respawn': 'true',
-                 'params_file': LaunchConfiguration('lines_file')}
+    # All of them: an argument that is not given comes from the launch file that includes this one.
+    arguments = dict.fromkeys(parameter_types(), '') | {
+        'namespace': namespace, 'name': 'abdf1', 'log_level': 'info', 'respawn': 'true',
+        'params_file': LaunchConfiguration('lines_file')}
     return GroupAction([IncludeLaunchDescription(
         PythonLaunchDescriptionSource(bridge), launch_arguments=arguments.items())],
         condition=UnlessCondition(LaunchConfiguration('one_process')))

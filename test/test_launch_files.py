@@ -227,7 +227,7 @@ def test_robot_starts_its_bridge_and_its_cell_in_its_namespace(tmp_path: Path) -
     port = tmp_path / 'plc'
     with Observer() as observer, Process('simulator', '--pty', str(port)) as simulator:
         simulator.wait_for('stations 1 (PLC5), 2 (SLC) on')
-        process = ros2('launch', str(example), 'robot:=robot_2', f'port:={port}')
+        process = ros2('launch', str(example), 'robot:=robot_2', f'port:={port}', 'namespace:=a')
         try:
             process.wait_for('not permitted: the PLC permits; waiting for a reset')
             reset = '/robot_2/interlock_consumer/reset'
@@ -243,11 +243,14 @@ def test_robot_starts_its_bridge_and_its_cell_in_its_namespace(tmp_path: Path) -
 
 
 @pytest.mark.parametrize('one_process', ['false', 'true'])
-def test_three_lines_run_side_by_side(launch: Starter, one_process: str) -> None:
+def test_three_lines_run_side_by_side(tmp_path: Path, one_process: str) -> None:
+    robot = tmp_path / 'robot.launch.xml'
+    robot.write_text('<launch><include file="$(find-pkg-share abdf1_ros)/launch/'
+                     'three_lines.launch.py"/></launch>', encoding='utf-8')
     sections = yaml.safe_load((SOURCE / 'config' / 'three_lines.yaml').read_text('utf-8'))
     with Observer() as observer:
         diagnostics = observer.listen(DiagnosticArray, '/diagnostics', EVERYTHING)
-        process = launch('three_lines.launch.py', f'one_process:={one_process}')
+        process = ros2('launch', str(robot), f'one_process:={one_process}', 'port:=/dev/lidar')
         for namespace in ('press', 'paint', 'packing'):
             process.wait_for(f'/dev/abdf1-{namespace}: cannot open the port')
         observer.until(
