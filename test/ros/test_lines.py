@@ -249,7 +249,7 @@ class Plant:
 
     def fail(self, name: str) -> None:
         """Let a bug show in a line."""
-        self.nodes[name].session.reads.latest = None
+        self.nodes[name].session.events.read = None
 
     def end(self) -> int:
         """End the process as SIGTERM does; return its exit status."""
