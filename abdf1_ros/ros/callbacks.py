@@ -95,7 +95,7 @@ class AnsweringNode(Node):
                                       callback_group=callback_group)
 
     def tell_failure(self, what: str, error: BaseException) -> None:
-        """Log that the handling of a message or call, or a periodic check, has failed."""
+        """Log that a message, a call, a periodic check or a status has failed."""
         self._failures.error('what comes from outside', (
             f'{what} has failed, all else goes on: {failure_text(error)}'))
 

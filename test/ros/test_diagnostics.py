@@ -887,6 +887,12 @@ def test_value_of_a_guest_over_a_fallback_is_a_warning(make_bench: Benches) -> N
         'speed': 'a guest has written over the fallback value (timeout): STS 10',
         'bound of speed': str(bound).partition(': ')[2]}
 
+    class Confirmed:  # by the thread of the link at this moment
+        value = property(lambda self: setattr(row, 'cause', None) or 'due')
+
+    bench.driver.interlocks.fallbacks[0].state = Confirmed()  # type: ignore[assignment]
+    assert details(bench.diagnostics.statuses(NOW)[-1])['speed'] == 'due (timeout): STS 10'
+
 
 def test_station_is_told_by_the_worst_of_its_heartbeats(make_bench: Benches) -> None:
     bench = make_bench(*(f'beat_{word},Heartbeat,N10:{word},1,PLC5,1000' for word in range(3)))

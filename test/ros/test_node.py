@@ -355,7 +355,7 @@ def test_end_is_not_taken_back_by_a_request(
 def test_internal_errors_are_told_and_the_third_is_the_end(
         make_bench: Benches, capfd: Output) -> None:
     bench = make_bench(SPEED)
-    bench.node.session.reads.latest = None  # a bug
+    bench.node.session.events.read = None  # a bug
     bench.ros.until(lambda: bench.node.link.has_failed, 'the third fault')
     bench.node.link.join()
     until_status(bench.diagnostics, 'link', ERROR, lambda status: status.message.startswith(
@@ -380,9 +380,12 @@ def test_call_that_no_client_library_would_send_is_refused_and_ends_nothing(
         assert f'{kind} is not a valid Parameter.Type' in result.reason
 
 
-def test_service_that_fails_answers_without_success(
-        make_bench: Benches, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_service_that_fails_answers_without_success_and_a_status_that_fails_is_told(
+        make_bench: Benches, monkeypatch: pytest.MonkeyPatch, capfd: Output) -> None:
     bench = make_bench(SPEED)
+    monkeypatch.setattr(bench.node.session.diagnostics, 'levels', None)
+    bench.node.check()
+    assert 'a status has failed, all else goes on: TypeErr' in capfd.readouterr().err
     monkeypatch.setattr(bench.node.session.diagnostics.counters, 'reset', None)
     for _ in range(5):
         answer = bench.call(Trigger, 'reset_counters', Trigger.Request())

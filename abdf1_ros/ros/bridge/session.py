@@ -305,6 +305,12 @@ class BridgeSession:
         self.events.unreadable_rows.look(now)
         for watch in self._watches:
             self._look(watch, now)
+        try:
+            self._publish_statuses(now)
+        except Exception as error:  # a status must not end a bridge
+            self._surroundings.node.tell_failure('a status', error)
+
+    def _publish_statuses(self, now: float) -> None:
         levels = self.diagnostics.levels(now, is_waiting=self.is_waiting)
         if now >= self.next_diagnostics or levels != self.levels:
             self.levels = levels

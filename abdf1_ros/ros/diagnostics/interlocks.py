@@ -143,9 +143,10 @@ def _is_taken(beat: HeartbeatRow) -> bool:
 
 
 def _fallback(row: FallbackRow) -> str:
-    if row.cause is None:
+    cause = row.cause  # once: the link's thread may change it meanwhile
+    if cause is None:
         return row.state.value
-    return f'{row.state.value} ({row.cause.value})' + (f': {row.refusal}' if row.refusal else '')
+    return f'{row.state.value} ({cause.value})' + (f': {row.refusal}' if row.refusal else '')
 
 
 def _bound(bound: Bound) -> str:
