@@ -232,7 +232,7 @@ def test_level_that_changes_is_published_at_once(
     session.publish_diagnostics(following + 0.3)
     assert 7.0 < following <= 8.0 and session.next_diagnostics == pytest.approx(following + 1.0)
     monkeypatch.setattr(session, 'publish_diagnostics', published.append)
-    monkeypatch.setattr(bench.node.writes.standstills, 'look', looks.append)
+    monkeypatch.setattr(bench.node.writes.host_clock, 'look', lambda *now: looks.append(now))
     monkeypatch.setattr(bench.node.surroundings.snapshot, 'has_subscribers', pytest.fail)
     session.levels, session.next_diagnostics = [], math.inf
     for _ in range(2):

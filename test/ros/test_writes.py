@@ -211,7 +211,7 @@ def test_message_that_waits_for_rows_which_a_reload_takes_away_or_that_fails_end
     node.tasks[0]()
     assert node.said == ['a message on ~/write/b', 'b 1']
     for before in 9.0, 0.0:
-        topics.standstills.look(line_time() - before)
+        topics.host_clock.look(line_time() - before, 0.0)
     node.publish('c', 1)
     assert node.said[2].startswith('c 1: it came 9.0 s after it was published')
 

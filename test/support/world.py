@@ -53,7 +53,7 @@ from abdf1_ros.df1.slave import HalfDuplexSlave
 from abdf1_ros.driver.guests import Guest, GuestCommand, ShareAccess
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import WriteResult
-from abdf1_ros.driver.writes.ages import Ages, most_ahead, Standstills
+from abdf1_ros.driver.writes.ages import Ages, HostClock, most_ahead
 from abdf1_ros.errors import FormatError, LinkError, PortLost
 from abdf1_ros.pccc.address import Address, Area
 from abdf1_ros.pccc.emulated import Setting
@@ -361,13 +361,17 @@ class Clocks:
     def forget(self) -> None:
         """Begin like a process that has just started."""
         self._shown: dict[str, float] = {}  # when a stamp of a topic was too far ahead
-        self.standstills = Standstills()
-        self._ages = {tag: Ages(self._patience, self.standstills, allowed)
+        self.host_clock = HostClock(self._patience)
+        self._ages = {tag: Ages(self._patience, self.host_clock, allowed)
                       for tag, allowed in self.allowed.items()}
 
     def set(self, seconds: float, now: float) -> None:  # noqa: A003
         """Set the clock of the host, by which its publishers go."""
         self._set_by, self._set_at = seconds, now
+
+    def look(self, now: float) -> None:
+        """Look at the clock of the host, as the main thread does."""
+        self.host_clock.look(now, now + self._set_by)
 
     def stamp(self, published: float) -> float:
         """Return the stamp of a message that was published then."""
@@ -393,7 +397,7 @@ class Clocks:
         lead = stamp - published - (self._set_by if published >= self._set_at else 0.0)
         return allowed is not None and lead > allowed \
             and now - self._shown.get(tag, -math.inf) > LEAD_IS_KNOWN \
-            and age >= self.standstills.least_age(now)
+            and age >= self.host_clock.least_age(now)
 
 
 class World(DriverBench):
@@ -679,7 +683,7 @@ class World(DriverBench):
     def _breathe(self) -> None:
         """Let the executor run, as it does while nothing holds it up."""
         if self.line.now >= self.away:
-            self.clocks.standstills.look(self.line.now)
+            self.clocks.look(self.line.now)
         if self.is_alive and self.line.now >= self.away:
             self.executor_ran = self.line.now
             self.driver.interlocks.executor_ran(self.line.now)

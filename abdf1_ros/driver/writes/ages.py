@@ -54,40 +54,54 @@ def most_ahead(topic: str, mappings: Iterable[Mapping]) -> float | None:
 
 class RecentMax:
     """
-    The greatest number of the last ``seconds``, or of at most twice that time.
+    The ``greatest`` number of the last ``seconds``, or of at most twice that time.
 
     Old numbers are forgotten only when a new number is added.
     """
 
     def __init__(self, seconds: float) -> None:
-        self._seconds = seconds
+        self.seconds = seconds
         self._since = -math.inf
         self._earlier = self._latest = -math.inf
 
+    @property
+    def greatest(self) -> float:
+        return max(self._latest, self._earlier)
+
     def add(self, number: float, now: float) -> float:
         """Take a number at a clock value (s); return the greatest."""
-        if now >= self._since + self._seconds:
+        if now >= self._since + self.seconds:
             self._earlier, self._latest, self._since = self._latest, -math.inf, now
         self._latest = max(self._latest, number)
-        return max(self._earlier, self._latest)
+        return self.greatest
 
 
-class Standstills:
-    """A detector of pauses of this process; call ``look`` ten times a second."""
+class HostClock:
+    """
+    Tells when this process stood still, and by how much its clock was set back.
 
-    def __init__(self) -> None:
+    One thread calls ``look`` ten times a second, so pauses without messages count as well.
+    ``offsets``: how far this clock was ahead of the clock that is never set (s).
+    """
+
+    def __init__(self, patience: float) -> None:
+        self.offsets = RecentMax(patience)
         self._looked = math.inf
         self._length, self._ended = 0.0, -math.inf
 
-    def look(self, now: float) -> None:
-        """Take the clock value (s)."""
+    def look(self, now: float, wall: float) -> None:
+        """Take the values (s) of the clock that is never set, and of the clock of stamps."""
+        self._see_pause(now)
+        self.offsets.add(wall - now, now)
+
+    def _see_pause(self, now: float) -> None:
         if now - self._looked > _LOOKS:
             self._length, self._ended = now - self._looked, now
         self._looked = now
 
     def least_age(self, now: float) -> float:
         """Return the age (s) that a message received now may have, whatever its stamp."""
-        self.look(now)
+        self._see_pause(now)
         return self._length if now < self._ended + _DRAINED else 0.0
 
 
@@ -99,12 +113,11 @@ class Ages:
     ``lead`` is by how much stamps were ahead lately (s).
     """
 
-    def __init__(self, patience: float, standstills: Standstills, allowed: float | None) -> None:
+    def __init__(self, patience: float, host_clock: HostClock, allowed: float | None) -> None:
         self._patience = patience
-        self._standstills = standstills
+        self._host_clock = host_clock
         self._allowed = allowed
         self._leads = RecentMax(_REMEMBERED)
-        self._offsets = RecentMax(patience)
         self.lead = 0.0
 
     @property
@@ -123,8 +136,8 @@ class Ages:
         ages = [wall - stamp for stamp in stamps]
         ahead = -min([0.0, *ages])
         self.lead = max(0.0, self._leads.add(ahead, now))
-        behind = self._offsets.add(wall - now, now) - (wall - now)  # the clock was set back
-        least = self._standstills.least_age(now)
+        behind = max(0.0, self._host_clock.offsets.greatest - (wall - now))  # it was set back
+        least = self._host_clock.least_age(now)
         waited = max([0.0, *ages])
         if self._allowed is not None:
             waited = max([least, *(age + behind for age in ages)])

@@ -298,8 +298,8 @@ class BridgeSession:
 
     def check(self) -> None:
         """Publish diagnostics if due or if a level has changed; end calls that wait no longer."""
-        now = line_time()
-        self._surroundings.writes.standstills.look(now)
+        wall, now = time.time(), line_time()
+        self._surroundings.writes.host_clock.look(now, wall)
         self.link_counters.check(now)
         self._surroundings.services.look(now)
         self.events.unreadable_rows.look(now)

@@ -30,7 +30,7 @@ import time
 from typing import Protocol
 
 from abdf1_ros.driver.driver import Driver, TOO_MANY
-from abdf1_ros.driver.writes.ages import Ages, most_ahead, Standstills
+from abdf1_ros.driver.writes.ages import Ages, HostClock, most_ahead
 from abdf1_ros.driver.writes.queue import MAX_WAITING_WRITES
 from abdf1_ros.errors import FormatError
 from abdf1_ros.ports.clock import line_time
@@ -166,7 +166,7 @@ class WriteTopics:
 
     Messages wait here until ``begin``; then they go to the topics set by ``give_to``. ``open`` may
     be called again at a reload. ``taken`` counts the messages handed on. The owner calls
-    ``standstills.look`` ten times a second.
+    ``host_clock.look`` ten times a second.
     """
 
     def __init__(self, node: AnsweringNode) -> None:
@@ -177,7 +177,7 @@ class WriteTopics:
         self._topics: dict[str, WriteTopic] = {}
         # Stamp and number of the latest messages of each topic; a busy topic drives out no other.
         self.latest: defaultdict[str, dict[tuple[int, int], None]] = defaultdict(dict)
-        self.standstills = Standstills()
+        self.host_clock = HostClock(0.0)  # open knows better
         self.taken = 0
 
     def begin(self) -> None:
@@ -200,6 +200,7 @@ class WriteTopics:
     def open(self, driver: Driver, patience: float,  # noqa: A003
              listener: WriteTopicListener, wake: Callable[[], None]) -> dict[str, WriteTopic]:
         """Subscribe to a driver's topics and return them; keep existing subscriptions."""
+        self.host_clock.offsets.seconds = patience
         wanted: defaultdict[str, list[Mapping]] = defaultdict(list)
         for mapping in driver.mappings:
             if mapping.writes:
@@ -214,7 +215,7 @@ class WriteTopics:
                 self._subscriptions[topic] = kind, self._subscription(topic, kind)
         return {topic: WriteTopic(
             topic, mappings, driver,
-            Ages(patience, self.standstills, most_ahead(topic, driver.mappings)),
+            Ages(patience, self.host_clock, most_ahead(topic, driver.mappings)),
             listener=listener, publishers=partial(self._publishers, topic), wake=wake,
             losses=LossCounter(partial(count_publishers, self._node, topic)))
             for topic, mappings in wanted.items()}

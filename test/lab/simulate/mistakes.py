@@ -60,7 +60,7 @@ from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.driver.record import Claim, OwnWords
 from abdf1_ros.driver.served import MappedTable
 from abdf1_ros.driver.write import Outcome, Write, WriteResult
-from abdf1_ros.driver.writes.ages import RecentMax, Standstills
+from abdf1_ros.driver.writes.ages import HostClock, RecentMax
 from abdf1_ros.driver.writes.queue import WriteQueue
 from abdf1_ros.driver.writes.standing import Standing
 from abdf1_ros.driver.writes.under_way import WriteJob
@@ -375,7 +375,7 @@ MISTAKES = (
             _refused_refreshes),
     Mistake('7', 'a clock that is ahead is forgotten', RecentMax, 'add',
             lambda before: lambda self, number, now: number),
-    Mistake('7', 'nobody sees that the process stood still', Standstills, 'least_age',
+    Mistake('7', 'nobody sees that the process stood still', HostClock, 'least_age',
             _always(0.0)),
     Mistake('7', 'messages wait for ever', WriteQueue, 'patience_of', _always(60.0)),
     Mistake('8', 'no fallback after the timeout', FallbackRow, 'deadline', _always(math.inf)),
