@@ -29,16 +29,17 @@ from abdf1_ros.ros.bridge.guests import GuestPlaces
 from abdf1_ros.ros.bridge.reload import changes, refuse_harm
 from abdf1_ros.ros.bridge.session import BridgeSession
 from abdf1_ros.ros.diagnostics.line import LineView
-from abdf1_ros.ros.parameters.declared import Configuration, Parameters
+from abdf1_ros.ros.parameters.declared import Configuration, Parameters, read_again
 from abdf1_ros.ros.parameters.file_watch import FileWatch
 from abdf1_ros.ros.parameters.shown import ShownFiles
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.rows import Rows
 import pytest
 from rcl_interfaces.srv import GetParameters
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
-from std_msgs.msg import Float32MultiArray, Int16MultiArray, UInt16MultiArray
+from std_msgs.msg import Float32MultiArray, Int16MultiArray, String, UInt16MultiArray
 from std_srvs.srv import SetBool, Trigger
 from support.commands import Output
 from support.mappings import make_mapping
@@ -218,18 +219,19 @@ def test_link_that_does_not_take_the_files_is_the_end(
     assert '[abdf1]: ends: the link does not accept the new files' in capfd.readouterr().err
 
 
-def test_files_that_cannot_be_taken_leave_messages_to_the_old_driver(
-        bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    results = bench.results
+def test_files_that_cannot_be_taken_leave_topics_and_services_to_the_old_driver(
+        bench: Bench) -> None:
+    results, node = bench.results, bench.node
     publisher = bench.ros.publisher(Int16MultiArray, '/abdf1/write/recipe')
-
-    def fail(*arguments: object) -> None:
-        raise KeyError('a bug')
-
-    monkeypatch.setattr('abdf1_ros.ros.bridge.session.LinkCounterService', fail)
-    with pytest.raises(KeyError):
-        bench.node.hand_over(bench.node.session.configuration)
-    bench.ros.until(lambda: bench.node.session.driver.is_online, 'the port')
+    node.create_publisher(String, '~/read/level', 1)  # DDS allows one type for a topic
+    publishers = [*node.publishers]
+    bench.write_map(SPEED.removesuffix('2') + '3', LEVEL)
+    with pytest.raises(rclpy_implementation.RCLError):
+        node.hand_over(read_again(node.session.configuration))
+    assert [*node.publishers] == publishers
+    bench.ros.until(lambda: node.session.driver.is_online, 'the port')
+    assert bench.call(Trigger, 'read_now/speed', Trigger.Request()).success
+    bench.ros.until(publisher.get_subscription_count, 'its topic')
     publisher.publish(Int16MultiArray(data=[5, 6]))
     assert results.next().message == 'written'
 

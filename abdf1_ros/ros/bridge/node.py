@@ -236,6 +236,7 @@ class BridgeNode(AnsweringNode):
             if not self.link.is_released:  # after the end that the PLCs know, a start
                 for wanted in (False, True):
                     self.set_polling(SetBool.Request(data=wanted), SetBool.Response())
+            before.go_on()
             raise
         session.diagnostics.line.attach(self.link, self._opener)
         self.session = session  # from now on, ``check`` judges its statuses

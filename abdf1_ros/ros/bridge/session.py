@@ -126,10 +126,6 @@ class BridgeSession:
         self.driver = Driver(network, mappings, configuration.driver_settings(), self.events)
         self._alarms = Alarms(self.driver.points.values(), self.port, line_time)
         self.writers: dict[str, WriteTopic] = {}
-        if surroundings.is_offered:
-            # Subscriptions first: after thousands of publishers, each subscription takes DDS 5 ms.
-            self.writers = self._open_writers()
-            self.reads.open(self.driver.points)
         self.guests = GuestPlaces(configuration, self.driver, surroundings.opener,
                                   self.events.notes, self._wake_link)
         self.diagnostics = Diagnostics(
@@ -152,6 +148,10 @@ class BridgeSession:
         self._snapshot: Snapshot | None = None
         # A random start, so that the nodes of a process do not publish all at the same moment.
         self._phase = random.uniform(0.0, parameters.diagnostics_period)
+        if surroundings.is_offered:
+            # Subscriptions first: after thousands of publishers, each subscription takes DDS 5 ms.
+            self.writers = self._open_writers()
+            self.reads.open(self.driver.points)
 
     @property
     def port(self) -> str:
@@ -202,6 +202,12 @@ class BridgeSession:
         self._surroundings.active_words = ()
         self._publish_active()
         self.guests.start()
+
+    def go_on(self) -> None:
+        """Take back write topics and services: the session of new files could not be made."""
+        if not self.is_waiting:
+            self.writers = self._open_writers()
+            self._surroundings.writes.give_to(self.writers)
 
     def withdraw(self) -> None:
         """Close the topics of the map, and the places of guests: the bridge has lost the line."""

@@ -95,27 +95,37 @@ class ReadTopics:
         self._topics.clear()
         self._later.clear()
         self.latest.clear()
-        for topic in self._published.values():
-            self._node.destroy_publisher(topic.publisher)
+        self._close(self._published, but={})
         self._published.clear()
 
+    def _close(self, topics: dict[str, ReadTopic], but: dict[str, ReadTopic]) -> None:
+        kept = set(but.values())
+        for topic in topics.values():
+            if topic not in kept:
+                self._node.destroy_publisher(topic.publisher)
+
     def open(self, points: MappingType[Mapping, ReadPoint]) -> None:  # noqa: A003
-        """Keep or make a publisher for each row that is read; some rows wait for ``take_over``."""
-        for mapping, point in points.items():
-            earlier = self._published.get(mapping.topic)
-            # DDS allows one type for a topic, so the old publisher with another type has to end
-            # first.
-            if earlier is not None and earlier.shape[0] is not mapping.message_type:
-                self._to_come.append((mapping, point))
-            else:
-                self._topics[mapping.topic] = self._topic(mapping, point, earlier)
+        """
+        Keep or make a publisher for each row that is read; some rows wait for ``take_over``.
+
+        If a publisher cannot be made, only those of the old map remain.
+        """
+        try:
+            for mapping, point in points.items():
+                earlier = self._published.get(mapping.topic)
+                # DDS allows one type for a topic, so the old publisher with another type has to
+                # end first.
+                if earlier is not None and earlier.shape[0] is not mapping.message_type:
+                    self._to_come.append((mapping, point))
+                else:
+                    self._topics[mapping.topic] = self._topic(mapping, point, earlier)
+        except Exception:
+            self._close(self._topics, but=self._published)
+            raise
 
     def take_over(self) -> None:
         """Close the unused publishers of the old map; then make the publishers that waited."""
-        kept = set(self._topics.values())
-        for topic in self._published.values():
-            if topic not in kept:
-                self._node.destroy_publisher(topic.publisher)
+        self._close(self._published, but=self._topics)
         for mapping, point in self._to_come:
             topic = self._topics[mapping.topic] = self._topic(mapping, point, None)
             published = None
