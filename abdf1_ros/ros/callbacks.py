@@ -191,6 +191,7 @@ class Callbacks(threading.Thread):
         """Run no more callbacks; wait for a running one, at most to a monotonic clock value."""
         self._ends = True
         self.wake()
-        self.join(max(0.0, give_up - time.monotonic()))
+        if self.is_alive():
+            self.join(max(0.0, give_up - time.monotonic()))
         if not self.is_alive():  # a living thread may wait on objects that a shutdown destroys
             self._executor.shutdown()

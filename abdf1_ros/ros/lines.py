@@ -124,11 +124,20 @@ class RestartedLine(Line):
         for fault in self.faults:
             self._logger.fatal(printable(fault))
 
+    def take_callbacks(self) -> None:
+        self._take(super().take_callbacks)
+
+    def open_port(self) -> None:
+        self._take(super().open_port)
+
     def check(self) -> None:
-        """Publish what is due; end and restart the line after an internal error."""
+        self._take(super().check)
+
+    def _take(self, step: Callable[[], None]) -> None:
+        """Take a step; end and restart the line after an internal error."""
         try:
-            super().check()
-        except Exception as error:  # a bug ends only this line
+            step()
+        except Exception as error:  # a bug, or no thread for the line, ends only this line
             self._begin_again(error)
 
     @property
@@ -146,8 +155,13 @@ class RestartedLine(Line):
         if self.node is not None:
             gone = Line(self.node, self._callbacks)
             self.node, self._callbacks = None, None
-            self.closing = threading.Thread(target=gone.close, name='closing', daemon=True)
-            self.closing.start()
+            closing = threading.Thread(target=gone.close, name='closing', daemon=True)
+            try:
+                closing.start()
+            except RuntimeError:  # there is no thread for that either
+                gone.close()
+            else:
+                self.closing = closing
 
     def end_callbacks(self, give_up: float) -> None:
         """End the callbacks; wait also for an old node that is being closed."""

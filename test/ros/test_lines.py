@@ -420,6 +420,13 @@ def test_new_files_do_not_make_a_line_the_second_master_on_the_port_of_another(
 def test_internal_error_at_the_start_of_a_line(
         plant: Plant, monkeypatch: pytest.MonkeyPatch, capfd: Output) -> None:
     made: list[float] = []
+    refused, start = ['callbacks', 'closing'], threading.Thread.start
+
+    def start_some(thread: threading.Thread) -> None:
+        if thread.name in refused:
+            refused.remove(thread.name)
+            raise RuntimeError("can't start new thread")
+        start(thread)
 
     def make(name: str, **named: Any) -> BridgeNode:
         if name == 'b':
@@ -429,11 +436,12 @@ def test_internal_error_at_the_start_of_a_line(
         return plant.make_node(name, **named)
 
     monkeypatch.setattr(module, 'BridgeNode', make)
+    monkeypatch.setattr(threading.Thread, 'start', start_some)
     plant.start()
     plant.observer.call(Trigger, '/lines/reload', Trigger.Request())
     assert [plant.speeds(name) for name in 'bac'] == [[7, ord(name)] for name in 'bac']
     assert len(made) == 2 and made[1] - made[0] >= module.RESTART_AFTER
-    assert line_status(plant, OK)['restarts'] == '1'
+    assert line_status(plant, OK)['restarts'] == '2'
     assert "is started again: AttributeError('a bug')" in capfd.readouterr().err
 
 
