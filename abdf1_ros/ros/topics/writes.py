@@ -43,7 +43,7 @@ from rclpy.node import Node
 from rclpy.subscription import Subscription
 from std_msgs.msg import String
 
-_LONGEST_LABEL = 100
+_LONGEST_LABEL = 1000  # the full name of a node has up to 255 characters
 
 # Shortest time (s) between two reports of a clock that is ahead.
 _REPORT_PERIOD = 2.0
