@@ -47,7 +47,7 @@ class LostPublisher:
 class StandInNode:
     """A node that makes such publishers."""
 
-    def create_publisher(self, *arguments: object) -> LostPublisher:
+    def create_publisher(self, *arguments: object, **options: object) -> LostPublisher:
         return LostPublisher()
 
     def destroy_publisher(self, publisher: object) -> None:
@@ -78,6 +78,12 @@ def test_message_that_meets_the_loss_of_the_line_is_no_error(offered: LosingPubl
     offered.is_losing = True
     offered.publish(UInt8())
     assert not offered.is_losing
+    node: Any = StandInNode()
+    topics, row = ReadTopics(node, {}), make_mapping('N7:0')
+    topics.open({row: SimpleNamespace(stale_time=1.0)})  # type: ignore[dict-item]
+    for _ in range(6):
+        topics.read(row, array('h', [7]))
+    topics.publish_later_values()
 
 
 def test_message_that_another_thread_has_taken_is_no_error(offered: LosingPublisher) -> None:

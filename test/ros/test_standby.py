@@ -235,12 +235,16 @@ def test_change_that_waits_for_the_executor_is_not_begun_again_before_it_ends() 
     standby = Standby(around, lambda: session, [])
     for _ in range(2):
         standby.look()
-    (change, step), = tasks
+    (change,), = tasks
+    session.has_line = True
+    change()  # a station has answered meanwhile
+    session.has_line = False
+    standby.look()
     with pytest.raises(KeyError):
-        change(step)
+        change()
     session.has_line = True
     standby.look()
-    assert len(tasks) == 2
+    assert len(tasks) == 3
 
 
 def test_spare_in_the_queue_of_a_device_server_waits_and_keeps_its_line_over_a_reload(

@@ -67,19 +67,28 @@ class Standby:
 
         After a released port is taken back, a bridge without the line closes its last services.
         """
-        has_line, executor = self._session().has_line, self._surroundings.node.executor
-        is_offered = self._surroundings.is_offered
-        has_rest = not is_offered and self._made and not self._surroundings.link.is_released
-        if has_line is is_offered and not has_rest or self._is_changing or executor is None:
-            return
-        self._is_changing = True
-        executor.create_task(self._change, (
-            self._take_line if has_line else self.leave_line if is_offered else self._close))
+        executor = self._surroundings.node.executor
+        if self._step() is not None and not self._is_changing and executor is not None:
+            self._is_changing = True
+            executor.create_task(self._change)
 
-    def _change(self, step: Callable[[], None]) -> None:
-        """Take a step; if it fails, the next look goes on from there."""
+    def _step(self) -> Callable[[], None] | None:
+        """Return the change that is due."""
+        has_line, is_offered = self._session().has_line, self._surroundings.is_offered
+        if has_line is not is_offered:
+            return self._take_line if has_line else self.leave_line
+        has_rest = not is_offered and self._made and not self._surroundings.link.is_released
+        return self._close if has_rest else None
+
+    def _change(self) -> None:
+        """
+        Make the change that is due now; if it fails, the next look goes on from there.
+
+        The executor may come to it late, as during a reload, when a new connection was heard.
+        """
         try:
-            step()
+            if (step := self._step()) is not None:
+                step()
         finally:
             self._is_changing = False
 

@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from collections.abc import Mapping as MappingType
+from contextlib import suppress
 from dataclasses import dataclass
 from operator import attrgetter
 
@@ -28,6 +29,7 @@ from abdf1_ros.ros.topics.messages import encoder, MESSAGES, read_qos
 from abdf1_ros.ros.untyped import RosMessage
 from abdf1_ros.settings.mapping import Mapping
 from rclpy.event_handler import PublisherEventCallbacks
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 
@@ -91,7 +93,7 @@ class ReadTopics:
         self.take_over()
 
     def withdraw(self) -> None:
-        """Close all publishers. The port is closed, so no read is under way."""
+        """Close all publishers; the link may publish a value meanwhile, which is lost."""
         self._topics.clear()
         self._later.clear()
         self.latest.clear()
@@ -158,13 +160,15 @@ class ReadTopics:
             return  # ``take_over`` publishes the value later
         if self._at_once:
             self._at_once -= 1
-            topic.publisher.publish(topic.encode(values))
+            with suppress(rclpy_implementation.InvalidHandle):  # ``withdraw`` has just closed it
+                topic.publisher.publish(topic.encode(values))
         else:
             self._later.append((topic.publisher, topic.encode(values)))
 
     def publish_later_values(self) -> None:
         """Publish the postponed values; a command is on the line now."""
         self._at_once = _VALUES_AT_ONCE
-        while self._later:
-            publisher, values = self._later.popleft()
-            publisher.publish(values)
+        with suppress(IndexError, rclpy_implementation.InvalidHandle):  # ``withdraw`` runs
+            while self._later:
+                publisher, values = self._later.popleft()
+                publisher.publish(values)
