@@ -110,7 +110,7 @@ class ReadTopics:
         """
         Keep or make a publisher for each row that is read; some rows wait for ``take_over``.
 
-        If a publisher cannot be made, only those of the old map remain.
+        If a publisher cannot be made, the publishers of the old map remain alone.
         """
         try:
             for mapping, point in points.items():
