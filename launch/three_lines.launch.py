@@ -97,7 +97,7 @@ def generate_launch_description() -> LaunchDescription:
             description='YAML file with the parameters of the three bridges'),
         DeclareLaunchArgument(
             'one_process', default_value='false',
-            description='true: all bridges in one process'),
+            description='true: all bridges in one process; not if a group has a namespace'),
         OpaqueFunction(function=refuse_unknown),
         *map(line, LINES),
         OpaqueFunction(function=start_lines,
