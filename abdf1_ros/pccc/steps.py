@@ -30,7 +30,7 @@ from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.status import check_status, is_address_fault, STS_ILLEGAL_COMMAND
-from abdf1_ros.pccc.structures import order_fault, type_fault, write_fault, wrong_type
+from abdf1_ros.pccc.structures import bits_fault, order_fault, type_fault, write_fault, wrong_type
 from abdf1_ros.pccc.values import Codec, types_of, Values, ValueType, WordOrder
 
 # From reports of libplctag's users about an SLC 5/05 and MicroLogix (its issues 121, 479 and 657).
@@ -67,7 +67,7 @@ class AddressedValues:
             last = address.at_offset(address.area_size - 1)
             raise FormatError(f'{length} elements do not fit at {address}; the last word there '
                               f'can be is {last}')
-        if fault := type_fault(address, kind, length):
+        if fault := bits_fault(address, kind, length) or type_fault(address, kind, length):
             raise FormatError(fault)
         return cls(address, codec, dialect_of(plc_type, access, processor))
 

@@ -80,6 +80,14 @@ def type_fault(address: Address, kind: ValueType, length: int) -> str | None:
     return None
 
 
+def bits_fault(address: Address, kind: ValueType, length: int) -> str | None:
+    """Return the fault if bits go on after their word of a structure, None if they do not."""
+    if kind is ValueType.BOOL and address.file_type.is_structure and \
+            (address.bit or 0) + length > BITS:
+        return 'bits of a structure end with their word'
+    return None
+
+
 def elements_text(first: Address, last: Address) -> str:
     """Return how to name all words from element to element, empty if they have several types."""
     start = replace(first, word=0, bit=None)
@@ -93,7 +101,7 @@ def write_fault(address: Address, kind: ValueType, length: int) -> str | None:
         return None
     if kind is ValueType.BOOL:
         first = address.bit or 0
-        wrong = [bit for bit in range(first, min(first + length, BITS))
+        wrong = [bit for bit in range(first, first + length)
                  if not address.layout.may_write(address.word, bit)]
         place = address.with_bit(wrong[0]) if wrong else None
     else:

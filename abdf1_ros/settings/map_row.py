@@ -30,7 +30,7 @@ from abdf1_ros.pccc.families import FAMILIES, parse_range
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.spellings import family_name
-from abdf1_ros.pccc.structures import order_fault, type_fault, write_fault, wrong_type
+from abdf1_ros.pccc.structures import bits_fault, order_fault, type_fault, write_fault, wrong_type
 from abdf1_ros.pccc.values import types_of, ValueType
 from abdf1_ros.problems import Problem
 from abdf1_ros.settings.columns import COMMAND, MAP_COLUMNS, NEEDED
@@ -302,9 +302,8 @@ class RowReader:
         address, words = mapping.address, mapping.codec.words
         column = 'Length' if self._row.get('Length') else 'Address'
         details = (self._row.get('Address'), mapping.length)
-        if address.file_type.is_structure and mapping.type is ValueType.BOOL and words > 1:
-            self._fault(column, 'bits of a structure end with their word',
-                        Message.ERR_ADDRESS_RANGE, *details)
+        if fault := bits_fault(address, mapping.type, mapping.length):
+            self._fault(column, fault, Message.ERR_ADDRESS_RANGE, *details)
         elif address.offset + words > address.area_size:
             step = 1 if address.file_type.is_structure else address.layout.words
             last = address.at_offset(address.area_size - step)
