@@ -50,7 +50,8 @@ def raw_values(mapping: Mapping, values: Sequence[float] | str) -> Sequence[floa
     if mapping.message_type is not ValueType.FLOAT32:
         _check_limits(mapping, values, *limits)
         return raw
-    _check_limits(mapping, values, *array('f', limits))
+    low, high = array('f', limits)
+    _check_limits(mapping, values, min(low, mapping.minimum), max(high, mapping.maximum))
     return _raw_inside(mapping, values)
 
 

@@ -129,15 +129,15 @@ def test_what_a_float32_cannot_hold_is_published_as_infinite() -> None:
 @pytest.mark.parametrize('scaling', [None, Scaling(0.37, 0.011), Scaling(-3.0, 0.5)])
 def test_limit_of_floats_is_kept_by_the_float32_that_is_written(scaling: Scaling | None) -> None:
     """The float32 nearest to a limit may be outside of it, and stands for it in a message."""
-    mapping = make_mapping('F8:0', 'Write', minimum=-0.1, maximum=0.1, scaling=scaling)
-    (tenth,) = array('f', [0.1])
-    assert tenth > 0.1
-    for value in (tenth, -tenth):
-        raw, = raw_values(mapping, [value])
-        assert [raw] == [*array('f', [raw])]
-        written = raw if scaling is None else raw * scaling.scale + scaling.offset
-        assert -0.1 <= written <= 0.1
-        assert written == pytest.approx(value, abs=1e-7)
+    for limit, (nearest,) in ((0.7, array('f', [0.7])), (0.1, array('f', [0.1]))):
+        mapping = make_mapping('F8:0', 'Write', minimum=-limit, maximum=limit, scaling=scaling)
+        assert (nearest > limit) is (limit == 0.1)
+        for value in (nearest, -nearest, limit, -limit):
+            raw, = raw_values(mapping, [value])
+            assert [raw] == [*array('f', [raw])]
+            written = raw if scaling is None else raw * scaling.scale + scaling.offset
+            assert -limit <= written <= limit
+            assert written == pytest.approx(value, abs=1e-7)
     with pytest.raises(FormatError, match=r'value 0.1001 at index 0 is outside Min -0.1, Max 0.1'):
         raw_values(mapping, [0.1001])
 
