@@ -227,14 +227,15 @@ def test_plc5_read_modify_write_of_the_same_word_twice_runs_in_order() -> None:
 
 def test_files_of_a_plc_5_80_are_counted_to_their_end() -> None:
     """The files of a PLC-5/40 to 5/80 may have 2,000 elements."""
-    there = DataTable(PlcType.PLC5)
-    there.create(parse_address('N12:0', PlcType.PLC5), 1500)
-    steps = Plc5FileSearch().look_for(12)
-    request = next(steps)
-    with pytest.raises(StopIteration) as done:
-        while True:
-            request = steps.send(Server(there).serve(Packet(1, 0, 0x0F, 0, 7, request[1])))
-    assert done.value.value == DataFile(FileType.INTEGER, 12, 1500)
+    for number in (12, 8):  # 8 is by default a file of floats
+        there = DataTable(PlcType.PLC5)
+        there.create(parse_address(f'N{number}:0', PlcType.PLC5), 1500)
+        steps = Plc5FileSearch().look_for(number)
+        request = next(steps)
+        with pytest.raises(StopIteration) as done:
+            while True:
+                request = steps.send(Server(there).serve(Packet(1, 0, 0x0F, 0, 7, request[1])))
+        assert done.value.value == DataFile(FileType.INTEGER, number, 1500)
     next(steps := Plc5FileSearch().look_for(12))
     with pytest.raises(RemoteError, match='STS 02'):  # a gateway that has lost the PLC
         steps.send(Packet(1, 0, 0x4F, 2, 7))

@@ -56,4 +56,5 @@ def _kind(number: int, data: TypedData) -> FileType | None:
         return usual
     if data.type_id == BYTE_STRING:
         return FileType.ASCII if data.element_size == 1 else FileType.STRING
-    return next((kind for kind in FILES if FILES[kind].code == data.type_id), None)
+    kinds = FileType.INTEGER, *FILES  # of all types with its code, a user file is this one
+    return next((kind for kind in kinds if FILES[kind].code == data.type_id), None)
