@@ -19,13 +19,17 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
 
+from abdf1_ros.cli.plc.data import processor_cell
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.errors import FormatError, LinkError, RemoteError
+from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.families import dialect_of, FAMILIES
 from abdf1_ros.pccc.file_search import DataFile
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.processor import Processor
+from abdf1_ros.pccc.structures import named_runs, type_fault
+from abdf1_ros.pccc.values import types_of
 from abdf1_ros.problems import Problem
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.rows import Rows
@@ -104,7 +108,7 @@ def outside(found: Sequence[DataFile], mappings: Sequence[Mapping]) -> Iterator[
 
 
 def map_rows(found: Sequence[DataFile], station: int, plc_type: PlcType,
-             processor: str, via: int | None = None) -> Iterator[str]:
+             processor: Processor | None, via: int | None = None) -> Iterator[str]:
     """Yield a map row of one packet for each file; a comment if no row is possible."""
     for entry in found:
         kind = entry.type
@@ -113,9 +117,14 @@ def map_rows(found: Sequence[DataFile], station: int, plc_type: PlcType,
                                                   'the names of its words'))
             continue
         per_element = FAMILIES[plc_type].layout(kind).words
-        packet = dialect_of(plc_type).max_read(kind)
+        packet = dialect_of(plc_type, processor=processor).max_read(kind)
         length = 1 if kind is FileType.STRING else min(
             entry.elements * per_element, packet // per_element * per_element)
+        start = Address(FAMILIES[plc_type].addressing, kind, entry.number, 0)
+        if type_fault(start, types_of(start)[0], length):
+            runs = ', '.join(str(run) for run, *_ in named_runs(start))
+            yield f'# {entry}: values of several types, at {runs}'
+            continue
         # Length counts words of structures, and elements of other files.
         if not kind.is_structure:
             length = max(1, length // per_element)
@@ -124,5 +133,5 @@ def map_rows(found: Sequence[DataFile], station: int, plc_type: PlcType,
                    f'{length}')
         number = '' if kind is FileType.STATUS else entry.number
         yield (f'{kind.value.lower()}{entry.number},Read,{kind.value}{number}:0,{station},'
-               f'{plc_type.value},{processor},{length},{_DRAFT_PERIOD}'
+               f'{plc_type.value},{processor_cell(processor)},{length},{_DRAFT_PERIOD}'
                f'{"" if via is None else f",{via}"}')

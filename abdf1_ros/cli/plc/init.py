@@ -136,7 +136,6 @@ def map_rows(stations: Iterable[Presence], listed: Mapping[int, Sequence[DataFil
         yield f'# interlocks_{number},Read,{there.bits},{tail},8,250,{guard},,\n'
         yield f'# setpoint_{number},Write,{there.setpoint},{tail},1,,,0,2000\n'
         yield f'# ros_alive_{number},Heartbeat,{there.heartbeat},{tail},,1000,,,\n'
-        for row in files.map_rows(listed.get(number, ()), number, family,
-                                  processor_cell(identity.processor)):
+        for row in files.map_rows(listed.get(number, ()), number, family, identity.processor):
             yield f'{row}\n' if row.startswith('#') else \
                 f'# {row.replace(",", f"_{number},", 1)},,,\n'

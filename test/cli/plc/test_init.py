@@ -245,9 +245,13 @@ def test_files_become_rows_of_a_map(port: str, station: str, rows: str, comments
     assert [line[2:] for line in text.splitlines() if line[0] == '#'] == comments
 
 
-def test_function_file_has_no_row_of_its_own() -> None:
-    assert [*draft_rows([DataFile(FileType.HSC, 0, 1)], 1, PlcType.SLC, '')] == [
-        '# HSC: addressed by the names of its words']
+def test_row_of_a_file_is_one_packet_of_one_type() -> None:
+    pid, integers = DataFile(FileType.PID, 30, 1), DataFile(FileType.INTEGER, 7, 256)
+    for entry, family, processor, row in (
+            (DataFile(FileType.HSC, 0, 1), PlcType.SLC, None, '# HSC: addressed by the names of'),
+            (pid, PlcType.PLC5, None, '# PD30: values of several types, at PD30:0, PD30:0.SP'),
+            (integers, PlcType.SLC, Processor.ML1400, 'n7,Read,N7:0,1,SLC,ML1400,103,')):
+        assert [*draft_rows([entry], 1, family, processor)][-1].startswith(row)
 
 
 def test_rows_of_a_map_that_lie_outside_of_the_files(

@@ -25,7 +25,7 @@ from __future__ import annotations
 import argparse
 from functools import partial
 
-from abdf1_ros.cli.plc import data, files
+from abdf1_ros.cli.plc import files
 from abdf1_ros.cli.plc.asking import ask, family_of
 from abdf1_ros.cli.plc.options import add_plc_type, add_station, stations_option
 from abdf1_ros.cli.plc.session import complain, Session
@@ -82,8 +82,7 @@ def _files(options: argparse.Namespace, session: Session, mappings: Rows) -> int
     if options.map is not None:
         print('Tag,Command,Address,Station,PLC_Type,Processor,Length,Period'
               + ('' if options.via is None else ',Via'))
-        for row in files.map_rows(found, options.station, family,
-                                  data.processor_cell(processor), options.via):
+        for row in files.map_rows(found, options.station, family, processor, options.via):
             print(row)
     return 0 if found else EXIT_FAILED
 
