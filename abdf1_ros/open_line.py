@@ -74,20 +74,30 @@ _Result = TypeVar('_Result')
 _ours: set[str] = set()  # the lines that this program has open
 
 
-def opened(settings: PortSettings) -> Callable[[], Port]:
+class OpenedPort:
     """
-    Open a port; return a function that returns it, and later opens it again.
+    A port that is open: a call returns it, and each later call opens it again.
 
     So a port that does not exist raises OSError here, and not in the thread of the link.
     """
-    try:
-        ports = [open_port(settings)]
-    except OSError as error:
-        if line_of(settings.name) in _ours:
-            error.strerror = 'this program has it open already; is a close() missing?'
-        name_port(error, settings.name)
-        raise
-    return lambda: ports.pop() if ports else open_port(settings)
+
+    def __init__(self, settings: PortSettings) -> None:
+        self._settings = settings
+        try:
+            self._ports = [open_port(settings)]
+        except OSError as error:
+            if line_of(settings.name) in _ours:
+                error.strerror = 'this program has it open already; is a close() missing?'
+            name_port(error, settings.name)
+            raise
+
+    def __call__(self) -> Port:
+        return self._ports.pop() if self._ports else open_port(self._settings)
+
+    def close(self) -> None:
+        """Close the port if no call has taken it."""
+        while self._ports:
+            self._ports.pop().close()
 
 
 class Pending(Generic[_Result]):
@@ -160,7 +170,8 @@ class OpenLine:
                                   self._told, may_store='://' in port.name)
         self.counters = self._requests.counters
         self._trace: Trace | None = None
-        port_of = opened(port)
+        self._port = OpenedPort(port)
+        port_of: Callable[[], Port] = self._port
         if trace is not None:
             port_of, self._trace = traced(
                 trace, port, line.checksum.value, mode.duplex, port_of, self.log.error)
@@ -217,6 +228,7 @@ class OpenLine:
     def close(self) -> None:
         """End all requests, also waiting ones, and close the port."""
         self._link.stop()
+        self._port.close()  # the thread may not have come to it
         self._requests.close()
         self._log_entries()
         if self._trace is not None:

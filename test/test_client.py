@@ -45,6 +45,7 @@ from abdf1_ros.errors import FormatError, LinkError, PortLost, RemoteError
 from abdf1_ros.open_line import kind_of, OpenLine, Pending
 from abdf1_ros.pccc.identity import Identity, Mode
 from abdf1_ros.pccc.steps import identify
+from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.problems import ConfigurationError
@@ -313,7 +314,8 @@ def test_arguments_of_the_line_and_gateways_reach_it(
     assert (stations.via(9), stations.via(8), str(plc_type), named) == (3, 8, 'SLC', more)
 
 
-def test_forgotten_close_is_told_and_closed_client_refuses(port: str) -> None:
+def test_forgotten_close_is_told_and_closed_client_refuses(
+        port: str, monkeypatch: pytest.MonkeyPatch) -> None:
     with client(port, plc_type='SLC') as plc, \
             pytest.raises(OSError, match=r'this program has it open already; is a close\(\) mis'):
         client(port)
@@ -322,6 +324,10 @@ def test_forgotten_close_is_told_and_closed_client_refuses(port: str) -> None:
             plc.read('N7:0')
         assert not error.value.sent
         plc.close()
+    with monkeypatch.context() as patch:
+        patch.setattr(LinkThread, 'start', lambda thread: None)  # as if it had no turn yet
+        early = client(port)
+        early.close()
     with client(port, plc_type='SLC') as plc:
         assert plc.read('N7:0') == 0
     with closing(open_port(PortSettings(port))), pytest.raises(OSError, match='another program'):

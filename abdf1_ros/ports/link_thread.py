@@ -280,6 +280,7 @@ class LinkThread(threading.Thread):
             self._wait()
         if self._is_interrupted:
             attempt.abandon()
+            attempt.join(_GLANCE)  # most ports are open, and so closed, at once
             return None
         attempt.join()  # it has only its call of ``wake`` left to do
         self._wake.take()

@@ -39,7 +39,7 @@ complain = partial(tell, 'plc', code=RED)
 def opened(network: Network) -> Callable[[], Port]:
     """Open the port of ``network``; NoPort when that fails."""
     try:
-        return open_line.opened(PortSettings.of(network))
+        return open_line.OpenedPort(PortSettings.of(network))
     except OSError as error:
         raise NoPort(network.port, error) from None
 
