@@ -112,6 +112,8 @@ def test_tag_of_kepserver_becomes_a_row(
      'Scaling "Square Root" has no counterpart; Linear has'),
     ('"Flat","N7:0",Word,1,RO,100,Linear,5,5,0,10,Float,0,0,,"",',
      'the ends of its scale should be numbers, and both raw ones differ: 5, 5, 0, 10'),
+    ('"Long","N7:0",Short,1,RO,100,Linear,0,"32,767",0,100,Float,0,0,,"",',
+     '"32,767" could be two numbers; write 32767 or 32.767'),
     ('"Still","N7:0",Word,1,RO,100,Linear,0,100,7,7,Float,0,0,,"",', 'Scale should not be 0'),
     ('"Char","N7:0",Char,1,RO,100,,,,,,,,,,"",', 'Data Type "Char" has no counterpart'),
     (f'"Long","N7:0 [{"9" * 5000}]",Word Array,1,RO,100,,,,,,,,,,"",',

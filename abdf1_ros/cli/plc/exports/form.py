@@ -22,7 +22,7 @@ import re
 
 from abdf1_ros.cli.plc.exports.records import Record
 from abdf1_ros.errors import FormatError
-from abdf1_ros.numbers import decimal_number
+from abdf1_ros.numbers import decimal_number, two_readings
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.text import shown
@@ -139,8 +139,7 @@ def limited(command: str, wanted: Wanted) -> str:
 
 def scaling(ends: Sequence[str], sign: float = 1.0) -> Cells:
     """Return Scale and Offset that make raw low and raw high the values low and high."""
-    numbers = [decimal_number(text.replace(',', '.')) for text in ends]
-    raw_low, raw_high, low, high = numbers
+    raw_low, raw_high, low, high = map(_number, ends)
     if raw_low is None or raw_high is None or low is None or high is None or raw_low == raw_high:
         raise Unusable('the ends of its scale should be numbers, and both raw ones differ: '
                        f'{", ".join(map(shown, ends))}')
@@ -150,7 +149,14 @@ def scaling(ends: Sequence[str], sign: float = 1.0) -> Cells:
 
 def number_text(text: str) -> str:
     """Return a number as a map writes it; raise Unusable if the text is not a number."""
-    value = decimal_number(text.replace(',', '.'))
+    value = _number(text)
     if value is None:
         raise Unusable(f'"{shown(text)}" should be a number')
     return f'{value:.12g}'
+
+
+def _number(text: str) -> float | None:
+    """Return a number, which may have a decimal comma; None for other texts."""
+    if right := two_readings(text):
+        raise Unusable(f'"{shown(text)}" could be two numbers; write {right}')
+    return decimal_number(text.replace(',', '.'))
