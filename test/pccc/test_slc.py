@@ -158,11 +158,12 @@ def test_files_that_reads_find() -> None:
     """Files 0 to 2 have fixed types; a file has at most 256 elements (M 13-13)."""
     answer = served(('I:7.0', 1), ('S:0', 33), ('N3:0', 2), ('N7:0', 256), ('B8:0', 255),
                     *((f'{kind}{number}:0', 84) for number, kind in enumerate(
-                        ('F', 'T', 'C', 'R', 'L', 'ST', 'A', 'D'), 9)))
-    found = [carried_out(SlcFileSearch().look_for(number), answer) for number in range(18)]
+                        ('F', 'T', 'C', 'R', 'L', 'ST', 'A', 'D', 'PD', 'MG'), 9)))
+    found = [carried_out(SlcFileSearch().look_for(number), answer) for number in range(20)]
     assert [(str(entry), entry.elements) for entry in found if entry] == [
         ('I1', 0), ('S2', 33), ('N3', 2), ('N7', 256), ('B8', 255), ('F9', 42), ('T10', 28),
-        ('C11', 28), ('R12', 28), ('L13', 42), ('ST14', 2), ('A15', 84), ('D16', 84)]
+        ('C11', 28), ('R12', 28), ('L13', 42), ('ST14', 2), ('A15', 84), ('D16', 84),
+        ('PD17', 4), ('MG18', 4)]
 
 
 @for_all(('code', 'own_row', 'names'), [

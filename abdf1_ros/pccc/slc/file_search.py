@@ -51,7 +51,8 @@ _FORCES = 0xA0  # types from here on are not data files
 _USUAL = {number: kind for kind, number in DEFAULT_FILES.items()}
 # Types of user files, the frequent ones first. Each of the first three files has a fixed type.
 _TYPES = (FileType.INTEGER, FileType.BINARY, FileType.FLOAT, FileType.TIMER, FileType.COUNTER,
-          FileType.CONTROL, FileType.LONG, FileType.STRING, FileType.ASCII, FileType.BCD)
+          FileType.CONTROL, FileType.LONG, FileType.STRING, FileType.ASCII, FileType.BCD,
+          FileType.PID, FileType.MESSAGE)
 _FIRST_OF_ANY_TYPE = 3
 _SLOTS_TRIED = 8  # slot 0 is the processor's own
 _MOST_ELEMENTS = 256
