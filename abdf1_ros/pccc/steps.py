@@ -63,6 +63,8 @@ class AddressedValues:
             raise FormatError(fault)
         if fault := order_fault(address, kind, word_order):
             raise FormatError(f'word order {fault}')
+        if address.file_type is FileType.STRING and length != 1:
+            raise FormatError('each string needs its own call, with length 1')
         if length < 1 or address.offset + codec.words > address.area_size:
             last = address.at_offset(address.area_size - 1)
             raise FormatError(f'{length} elements do not fit at {address}; the last word there '

@@ -105,7 +105,8 @@ def test_what_must_not_be_written_is_refused_before_the_first_step() -> None:
     with pytest.raises(FormatError, match='HSC:0.ACC belongs to the processor'):
         write(AddressedValues.of('HSC:0.ACC', SLC), [1])
     for text, length, fault in (('PD9:0.SP', 25, '25 float32 from PD9:0.SP reach to PD9:0.50'),
-                                ('C5:3/UN', 6, 'bits of a structure end with their word')):
+                                ('C5:3/UN', 6, 'bits of a structure end with their word'),
+                                ('ST9:0', 3, 'each string needs its own call, with length 1')):
         with pytest.raises(FormatError, match=f'^{fault}'):
             AddressedValues.of(text, PlcType.PLC5, length)
     with pytest.raises(FormatError, match='2 values'):
