@@ -235,7 +235,10 @@ class Client(OpenLine):
             return self.ask(number, steps.identify())
 
     def _of(self, station: int | None) -> int:
-        return _whole('station', self.station if station is None else station, 0, MAX_STATION)
+        number = _whole('station', self.station if station is None else station, 0, MAX_STATION)
+        if number == self._settings.station and not self._mode.has_one_plc:
+            raise FormatError(f'station {number} is own_station, so no PLC can answer as {number}')
+        return number
 
     def _row(self, text: str, item: int, station: int) -> tuple[Row, bool]:
         """Return a map row for an address or a range, and True if it is a single address."""

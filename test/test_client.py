@@ -248,6 +248,7 @@ def test_entries_of_the_log_that_nothing_takes_are_counted(
     ('N7:0', {'length': 3.0}, '^length 3.0 should be a whole number$'),
     ('N7:0', {'length': '3'}, "length '3' should be a whole number"),
     ('N7:0', {'station': '1'}, "station '1' should be"),
+    ('N7:0', {'station': 5}, 'station 5 is own_station, so no PLC can answer as 5'),
     ('N7:0', {'word_order': None}, 'word_order None should be one of Low, High'),
     *((address, {'word_order': 'High', **more}, f'word order High is for int32, .* not for {kind}')
       for address, more, kind in (('N7:0', {'length': 4}, 'int16'), ('F8:0', {}, 'float32'),
