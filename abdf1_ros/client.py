@@ -126,9 +126,8 @@ class Client(OpenLine):
         speed = _whole('baud', baud, 1)
         if speed not in BAUD_RATES:
             raise FormatError(f'baud {speed} should be one of {", ".join(map(str, BAUD_RATES))}')
-        settings = PortSettings(
-            path_of('port', port), speed,
-            parity=_choice('parity', _PARITY, parity))
+        settings = PortSettings(_port(port), speed,
+                                parity=_choice('parity', _PARITY, parity))
         times = _whole('retries', retries, 0, _MOST_RETRIES)
         super().__init__(_choice('duplex', _DUPLEX, duplex), LinkSettings(
             nak_retries=times, enq_retries=times,
@@ -274,6 +273,15 @@ class Client(OpenLine):
 
 def _place(address: str, station: int) -> str:
     return f'{shown(address)} of station {station}'
+
+
+def _port(value: str | os.PathLike[str]) -> str:
+    path = path_of('port', value)
+    if '://' in path:
+        from abdf1_ros.settings.network import is_url, URLS  # not needed for a device
+        if not is_url(path):
+            raise FormatError(f'port {shown(repr(path))} should be a device path, {URLS}')
+    return path
 
 
 def _whole(name: str, value: object, low: float = -math.inf, high: float = math.inf) -> int:

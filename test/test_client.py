@@ -290,8 +290,9 @@ def test_arguments_of_the_line(tmp_path: Path) -> None:
             ({'processor': '5/02'}, 'processor needs plc_type')):
         with pytest.raises(FormatError, match=text):
             Client(port, **wrong)  # type: ignore[arg-type]
-    for name, right in ((None, 'port None'), (5, 'port 5'), ('', "port ''")):
-        with pytest.raises(FormatError, match=f'{right} should be a text'):
+    for name, right in ((None, 'text'), (5, 'text'), ('', 'text'), *(
+            (f'socket://host{end}', 'device path, socket') for end in ('', ':x', ':99999'))):
+        with pytest.raises(FormatError, match=f'port {name!r} should be a {right}'):
             Client(name)  # type: ignore[arg-type]
     with pytest.raises(OSError, match='none'):
         Client(Path(port), parity='odd', timeout=60)

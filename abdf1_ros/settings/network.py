@@ -331,7 +331,7 @@ def make_network(values: MappingType[str, tuple[str, Place | str]],
 
 
 def _port_fault(text: str) -> str:
-    if _is_url(text) or _is_device(text):
+    if is_url(text) or _is_device(text):
         return ''
     advice = f'"plc ports" lists the devices{hint(text)}'
     match = _HOST.fullmatch(text)
@@ -391,7 +391,7 @@ def _is_host(name: str) -> bool:
         return False
 
 
-def _is_url(text: str) -> bool:
+def is_url(text: str) -> bool:
     """Tell whether ``text`` is the URL of a device server: host, port, and nothing after them."""
     try:
         url = urlsplit(text)
