@@ -44,7 +44,8 @@ _STEP = 0.001  # s between chunks of a recording without times
 
 # The end of a read in words, as written by ``describe``.
 _READ = re.compile(r'(?P<address>[A-Z]{1,3}\d*:\S+), (?P<count>\d+) (?P<unit>word|element)s?\Z')
-_BYTES = re.compile(r'(?P<address>[0-7]+) \(ADDR \d+\), (?P<count>\d+) bytes?\Z')
+# The same in bytes, if they are whole words.
+_BYTES = re.compile(r'(?P<address>[0-7]+) \(ADDR \d*[02468]\), (?P<count>\d*[02468]) bytes\Z')
 
 HEAD = """\
 # What another master reads on this line, one row a read. Each becomes a topic; the bridge sends

@@ -96,6 +96,10 @@ class Family:
         """Return the file types that it can have."""
         return tuple(kind for kind in FileType if kind in self.addressing.files)
 
+    def longest_reply(self, file_type: FileType) -> int:
+        """Return the most words that a reply can have, whichever read another node sends."""
+        return max(dialect.max_read(file_type) for dialect in self.dialects.values())
+
     def layout(self, file_type: FileType) -> Layout:
         """Return the layout of the elements of such a file; KeyError if the family has none."""
         return self.addressing.files[file_type]

@@ -22,6 +22,7 @@ from dataclasses import replace
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile
+from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.plan.bounds import guard_faults
 from abdf1_ros.plan.forecast import line_model
@@ -84,7 +85,7 @@ def usable_rows(mappings: Rows, network: Network,
 
 def _listen_fault(mapping: Mapping) -> tuple[str, str] | None:
     """Return the column and the fault of a row that no traffic can fill, None for none."""
-    most = mapping.dialect.max_read(mapping.address.file_type)
+    most = FAMILIES[mapping.plc_type].longest_reply(mapping.address.file_type)
     if mapping.command is not Command.READ:
         return 'Command', (f'{mapping.command.value} sends commands, and Mode Listen sends '
                            'nothing; only Read rows are possible')

@@ -252,6 +252,8 @@ def test_reads_of_a_full_duplex_line_are_heard_on_two_ports(
     (0x0F, 'A2 08 0A 91 00 00', 2, 'l10_0_2_of_3,Read,L10:0,3,SLC,2,5000'),
     (0x2F, '68 00 00 02 00 06 07 00 02 00', 3, 'n7_0_2_of_3,Read,N7:0,3,PLC5,2,5000'),
     (0x01, '20 00 04', 4, '020_2_of_3,Read,020,3,PLC2,2,2000'),
+    *((0x01, data, 1, f'# station 3: unprotected read 020 (ADDR {text} bytes: 1 time')
+      for data, text in (('20 00 03', '32), 3'), ('21 00 02', '33), 2'))),
     (0x0F, 'A2 06 04 86 00 02', 1, '# station 3: protected typed logical read T4:0.ACC, 3 words: '
      '1 time'), (0x0F, '01 00 00 04 00 06 08 00 08', 2, '# station 3: word range read F8:0, 4 '
                  'words: 2 times'), (0x06, '03', 1, '# station 3: diagnostic status: 1 time'),
