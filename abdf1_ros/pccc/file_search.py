@@ -19,13 +19,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-from abdf1_ros.df1.packet import is_local_status
 from abdf1_ros.errors import FormatError, RemoteError
 from abdf1_ros.pccc.address import Address, Addressing
 from abdf1_ros.pccc.dialect import Dialect, Steps
 from abdf1_ros.pccc.file_types import FileType
 from abdf1_ros.pccc.processor import Processor
-from abdf1_ros.pccc.status import check_status
+from abdf1_ros.pccc.status import (
+    check_status,
+    EXT_BAD_PARAMETER,
+    EXT_OTHER_TYPE,
+    is_address_fault,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,19 +65,20 @@ class FileSearch(Protocol):
 
 
 def is_there(address: Address, dialect: Dialect) -> Steps[bool]:
-    """Tell whether a read of an element succeeds; raises RemoteError of a node on the way."""
+    """Tell whether a read of an element succeeds; raises what ``check_absent`` does."""
     words = address.layout.words
     try:
         dialect.read_data(address, words, check_status((yield dialect.read(address, words))))
     except (RemoteError, FormatError) as error:
-        check_way(error)
+        check_absent(error)
         return False
     return True
 
 
-def check_way(error: RemoteError | FormatError) -> None:
-    """Raise an error of a node on the way, which does not tell what the PLC has."""
-    if isinstance(error, RemoteError) and is_local_status(error.sts):
+def check_absent(error: RemoteError | FormatError) -> None:
+    """Raise a refusal that does not tell what the PLC has: of a node on the way, or of access."""
+    if isinstance(error, RemoteError) and not is_address_fault(error) \
+            and error.ext_sts not in (EXT_OTHER_TYPE, EXT_BAD_PARAMETER):
         raise error
 
 

@@ -75,11 +75,13 @@ def test_values_across_elements_are_read_in_whole_elements() -> None:
 
 def test_refused_or_odd_reply_is_no_file_and_leaves_an_identity_as_it_was() -> None:
     values = AddressedValues.of('N7:0', SLC)
-    for odd in (reply(b'\1'), reply(sts=0x10)):
+    for odd in (reply(b'\1'), reply(sts=0x10), reply(b'\x11', 0xF0)):
         assert len(requests_of(is_there(values.address, values.dialect), odd)) == 1
         assert len(requests_of(identify(), reply(FAULTED), odd)) == 2  # an old PLC-5
-    with pytest.raises(RemoteError, match='STS 02'):  # a gateway has lost its PLC
-        requests_of(is_there(values.address, values.dialect), reply(sts=0x02))
+    # A gateway has lost its PLC, no buffer, access denied, owned by another node.
+    for refused in (reply(sts=0x02), reply(sts=0x90), reply(b'\x0B', 0xF0), reply(b'\x1A', 0xF0)):
+        with pytest.raises(RemoteError):
+            requests_of(is_there(values.address, values.dialect), refused)
 
 
 def test_echo_is_what_was_sent() -> None:

@@ -50,8 +50,8 @@ def find_files(session: Session, station: int, plc_type: PlcType, processor: Pro
     Yield the files among ``numbers``: from the processor's own list, or found by reads.
 
     ``show`` gets a text about the present file, ``warn`` the reason why no list is used. Raises
-    LinkError, RemoteError of a node on the way, and FormatError for a family without a way to find
-    files.
+    LinkError, RemoteError of a refusal that does not tell whether a file is there, and FormatError
+    for a family without a way to find files.
     """
     family = FAMILIES[plc_type]
     search = family.file_search
@@ -68,7 +68,8 @@ def find_files(session: Session, station: int, plc_type: PlcType, processor: Pro
             warn(f'its file directory cannot be read ({error}); we try every file number')
     for number in USUAL_NUMBERS if numbers is None else numbers:
         show(f'file {number}')
-        found = session.ask(station, search.look_for(number))
+        with session.naming(f'file {number}'):
+            found = session.ask(station, search.look_for(number))
         if found is not None:
             yield found
 

@@ -19,7 +19,7 @@ from __future__ import annotations
 from abdf1_ros.errors import FormatError, RemoteError
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.dialect import Steps
-from abdf1_ros.pccc.file_search import check_way, counted, DataFile
+from abdf1_ros.pccc.file_search import check_absent, counted, DataFile
 from abdf1_ros.pccc.file_types import DEFAULT_FILES, FileType
 from abdf1_ros.pccc.plc5.address import ADDRESSING, FILES
 from abdf1_ros.pccc.plc5.dialect import PLC5_TYPED
@@ -41,7 +41,7 @@ class Plc5FileSearch:
         try:
             kind = _kind(number, TypedData.decode(check_status((yield PLC5_TYPED.read(start, 1)))))
         except (RemoteError, FormatError) as error:
-            check_way(error)
+            check_absent(error)
             return None
         if kind is None or kind.is_io:
             return kind and DataFile(kind, number, 0)
