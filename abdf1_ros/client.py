@@ -45,7 +45,7 @@ from abdf1_ros.df1.peer import PEER
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave_link import SLAVE
 from abdf1_ros.df1.stations import MAX_STATION
-from abdf1_ros.errors import FormatError
+from abdf1_ros.errors import FormatError, LinkError
 from abdf1_ros.numbers import member_of, one_of, ValueKind
 from abdf1_ros.open_line import (
     kind_of,
@@ -266,8 +266,12 @@ class Client(OpenLine):
     def _asked(self, station: int) -> tuple[PlcType, Processor | None]:
         """Return family and processor of a station; the station is asked for them only once."""
         if station not in self._kinds:
-            self._kinds[station] = kind_of(
-                lambda: self.identify(station), 'name plc_type', f'station {station} ')
+            try:
+                self._kinds[station] = kind_of(
+                    lambda: self.identify(station), 'name plc_type', f'station {station} ')
+            except LinkError as error:
+                error.sent = False  # the command of the call was not
+                raise
         return self._kinds[station]
 
 
