@@ -293,7 +293,7 @@ def traced(path: str, port: PortSettings, check: str, duplex: Duplex, open_it: C
     except OSError as error:
         open_it().close()  # it was open already
         raise ConfigurationError([Problem(
-            error.filename or 'trace', error.strerror or str(error))]) from None
+            error.filename or path, error.strerror or str(error))]) from None
     begun = time.monotonic()
     return lambda: TracedPort(open_it(), trace, begun), trace
 

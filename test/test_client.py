@@ -202,7 +202,7 @@ def test_retries_trace_and_log_are_arguments(port: str, tmp_path: Path,
     with pytest.raises(ConfigurationError) as error:
         client_with(port, trace=__file__)
     client_with(port).close()  # it is free, though the error keeps what was made before
-    assert str(error.value).startswith(f'trace: {__file__} exists and is not a capture')
+    assert str(error.value).startswith(f'{__file__}: exists and is not a capture')
 
 
 def test_link_does_not_wait_for_a_handler_of_the_log(port: str) -> None:

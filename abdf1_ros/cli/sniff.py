@@ -426,7 +426,8 @@ def _listen(options: argparse.Namespace, output: Output) -> int:
         try:
             trace = Trace(options.save, settings, _say) if options.save else None
         except OSError as error:
-            raise ConfigurationError([Problem('--save', reason_of(options.save, error))]) from None
+            raise ConfigurationError([Problem('--save', reason_of(
+                error.filename or options.save, error))]) from None
         _say(f'listening on {" and ".join(tap.names)}; Ctrl-C ends')
         status = _print_heard(tap, trace, output, settings, options)
         output.end()

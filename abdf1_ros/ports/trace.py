@@ -167,7 +167,7 @@ class PortOpener:
         try:
             self._trace = Trace(path, settings, on_error, limit)
         except OSError as error:
-            on_error(f'{error}; nothing is recorded')
+            on_error(f'{error.filename or path}: {error.strerror}; nothing is recorded')
 
     def _head(self, head: dict[str, str]) -> dict[str, str]:
         return {'port': self.settings.name, 'baud': str(self.settings.baud), **head}

@@ -42,6 +42,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from enum import Enum
+import errno
 import fcntl
 import math
 from pathlib import Path
@@ -112,9 +113,11 @@ class CaptureWriter:
         self._written = 0
         for place in (path, Path(f'{path}.1')):
             if place.exists() and not may_replace(place, _MAGIC.encode()):
-                raise OSError(f'{place} exists and is not a capture; give another name')
+                raise OSError(errno.EEXIST, 'exists and is not a capture; give another name',
+                              str(place))
             if place.exists() and _is_locked(place):
-                raise OSError(f'{place} is being written by another; give another name')
+                raise OSError(errno.EBUSY, 'is being written by another; give another name',
+                              str(place))
         self._begin()
 
     def write(self, chunk: Chunk | str | dict[str, str]) -> None:

@@ -183,7 +183,7 @@ def test_opener_that_cannot_record_opens_all_the_same(tmp_path: Path) -> None:
     errors: list[str] = []
     opener = PortOpener(PortSettings(str(pty.name)))
     opener.trace(str(tmp_path), 1e6, {}, errors.append)
-    assert errors == [f'{tmp_path} exists and is not a capture; give another name; '
+    assert errors == [f'{tmp_path}: exists and is not a capture; give another name; '
                       'nothing is recorded']
     port = opener.open()
     port.write(b'\x01')

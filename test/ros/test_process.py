@@ -155,8 +155,8 @@ def test_trace_that_cannot_be_written_is_an_error_and_no_stop(
     speeds = observer.listen(msg.Int16MultiArray, '/traced/read/speeds')
     with files.start_simulator() as simulator, \
             Process('node', *files.args(f'trace_file:={trace}'), '-r', '__node:=traced') as node:
-        node.wait_for('[ERROR] ', 'trace_file: [Errno 2] No such file or directory: '
-                                  f"'{trace}'; nothing is recorded")
+        node.wait_for('[ERROR] ', f'trace_file: {trace}: No such file or directory; '
+                                  'nothing is recorded')
         speeds.values([1200, -800])
         node.end()
         simulator.end()

@@ -97,7 +97,7 @@ def test_older_capture_is_put_aside(tmp_path: Path) -> None:
     path = tmp_path / 'x'
     for chunk in CHUNKS:
         writer = capture.CaptureWriter(path)
-        with pytest.raises(OSError, match='x is being written by another; give another name'):
+        with pytest.raises(OSError, match='is being written by another; give another name'):
             capture.CaptureWriter(path)  # such as that of another line of this process
         writer.write(chunk)
         writer.close()
@@ -124,7 +124,7 @@ def test_other_files_are_left_alone(tmp_path: Path) -> None:
         capture.CaptureWriter(path)
     assert path.read_text(encoding='ascii') == 'important'
     path.rename(tmp_path / 'y.1')  # where an older part of a capture y goes
-    with pytest.raises(OSError, match='y.1 exists and is not a capture'):
+    with pytest.raises(OSError, match=r'exists and is not a capture.*y\.1'):
         capture.CaptureWriter(tmp_path / 'y')
     assert (tmp_path / 'y.1').read_text(encoding='ascii') == 'important'
     (tmp_path / 'device').symlink_to('/dev/null')  # a fault here must not rename that of the host
