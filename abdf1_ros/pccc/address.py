@@ -147,6 +147,12 @@ class Address:
         return self.addressing.area_size(self)
 
     @property
+    def last_of_area(self) -> Address:
+        """Return the last word of the area; of elements without named words, the last element."""
+        words = 1 if self.file_type.is_structure else self.layout.words
+        return self.at_offset(self.area_size - words)
+
+    @property
     def is_by_type(self) -> bool:
         """Tell whether the number of its file is free for files of other types, too."""
         return self.addressing.has_sections or self.file_type.is_function

@@ -155,8 +155,7 @@ def _of_count(first: Address, names_word: bool, count: int) -> AddressRange:
     else:
         last = replace(first, element=first.element + count - 1)
     if last.offset >= first.area_size:
-        raise AddressRangeError('the last word there can be is '
-                                f'{first.at_offset(first.area_size - 1)}')
+        raise AddressRangeError(f'the last word there can be is {first.last_of_area}')
     is_whole = first.file_type.is_structure and not first.word and not names_word
     return AddressRange(first, last, is_whole, is_short=True)
 

@@ -66,7 +66,7 @@ class AddressedValues:
         if address.file_type is FileType.STRING and length != 1:
             raise FormatError('each string needs its own call, with length 1')
         if length < 1 or address.offset + codec.words > address.area_size:
-            last = address.at_offset(address.area_size - 1)
+            last = address.last_of_area
             raise FormatError(f'{length} elements do not fit at {address}; the last word there '
                               f'can be is {last}')
         if fault := bits_fault(address, kind, length) or type_fault(address, kind, length):

@@ -305,11 +305,9 @@ class RowReader:
         if fault := bits_fault(address, mapping.type, mapping.length):
             self._fault(column, fault, Message.ERR_ADDRESS_RANGE, *details)
         elif address.offset + words > address.area_size:
-            step = 1 if address.file_type.is_structure else address.layout.words
-            last = address.at_offset(address.area_size - step)
             size = '' if mapping.codec.element_words <= address.layout.words else (
                 f'{mapping.length} {mapping.type.value} from {address} on take {words} words; ')
-            self._fault(column, f'{size}the last word there can be is {last}',
+            self._fault(column, f'{size}the last word there can be is {address.last_of_area}',
                         Message.ERR_ADDRESS_RANGE, *details)
         elif fault := type_fault(address, mapping.type, mapping.length):
             self._fault(column, fault)

@@ -392,8 +392,8 @@ def _check_route(row: Row, plc: SimulatedPlc, via: int | None,
 
 def _check_extent(row: Row, address: Address, codec: Codec) -> None:
     if address.offset + codec.words > address.area_size:
-        last = address.at_offset(address.area_size - 1)
-        raise Problem(row.where('Length'), f'the last word there can be is {last}')
+        raise Problem(row.where('Length'),
+                      f'the last word there can be is {address.last_of_area}')
 
 
 def _place(row: Row, plc_type: PlcType) -> tuple[Address, int]:

@@ -230,6 +230,7 @@ def test_flat_io_has_no_words_of_slots() -> None:
 def test_offset_counts_words(text: str, family: PlcType, offset: int, size: int) -> None:
     address = parse_address(text, family)
     assert (address.offset, address.area_size) == (offset, size)
+    assert parse_address(str(address.last_of_area), family) == address.last_of_area
 
 
 def test_at_offset_names_a_word_and_no_bit() -> None:

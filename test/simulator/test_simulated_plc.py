@@ -194,7 +194,7 @@ def test_message_of_a_plc2_and_a_plc3_writes_its_value_and_tells_that_it_is_conf
     ('1,PLC5,N7:2000,,,,', '2:3 (Address): elements of N run from 0 to 1999'),
     ('1,PLC5,N7:0,0,,,', '2:4 (Length): Length = "0" should be a whole number from 1 to 1000'),
     ('1,PLC5,N7:0-3,3,,,', '2:4 (Length): N7:0-3 has Length 4'),
-    ('1,PLC5,N7:1998,3,,,', '2:4 (Length): the last word there can be is N7:1999'),
+    ('1,PLC5,F8:1998,3,,,', '2:4 (Length): the last word there can be is F8:1999'),
     ('1,SLC,T4:255,4,,,', '2:4 (Length): the last word there can be is T4:255.ACC'),
     ('1,PLC5,N7:0,1,1 2,,', '2:5 (Values): 2 values, the mapping has 1'),
     ('1,PLC5,N7:0,1,40000,,', '2:5 (Values): value 40000 at index 0 is not a valid int16'),
