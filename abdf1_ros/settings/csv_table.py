@@ -44,6 +44,9 @@ _DELIMITERS = {',': 'comma', ';': 'semicolon', '\t': 'tab'}
 _BLANK = ''.join(_DELIMITERS) + ' \r\n'
 _SEPARATOR_LINE = re.compile(r'"?sep=\W*', re.IGNORECASE)
 
+# The first cells of a line, with the spaces around each, and the comma or line end after it.
+_WHOLE_CELLS = r'(?:(?: *+"(?:[^"]|"")*+"[^\S,\r\n]*+| *+(?!")[^,\r\n]*+)(?:,|[\r\n]*\Z))*+'
+
 # Largest size of a file (bytes). A map with a row for each word of a PLC is far smaller.
 _LARGEST = 10_000_000
 # Most characters of a line: csv.reader has this limit for one cell.
@@ -212,6 +215,12 @@ def _cells(place: Place, line: str, delimiter: str) -> list[str]:
     if reader.line_num > 1:
         raise Problem(replace(place, cell=len(cells)),
                       'the quote that opens this cell is not closed on this line')
+    # csv.reader would join the text after a quoted cell to it: "1"0 would be 10.
+    whole = re.match(_WHOLE_CELLS.replace(',', delimiter), line)
+    if whole and whole.end() < len(line):
+        number = len(next(csv.reader([whole[0]], delimiter=delimiter, skipinitialspace=True)))
+        raise Problem(replace(place, cell=number), 'text follows the quote that closes this cell; '
+                                                   'write "" for a quote inside of quotes')
     return [cell.strip() for cell in cells]
 
 

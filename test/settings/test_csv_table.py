@@ -132,6 +132,7 @@ RSLOGIX = (', it has an address, as in an export of symbols from RSLogix ("plc i
 OUTSIDE = '"5" has no column; quote a cell that contains the delimiter'
 ONE_CELL = 'this row is one cell; its cells need a {} between them, outside of quotes'
 OPEN = 'the quote that opens this cell is not closed on this line'
+AFTER = 'text follows the quote that closes this cell; write "" for a quote inside of quotes'
 EMPTY = 'FILE:1: the file is empty; its first row names columns: Tag, Address, Length'
 LONG = 'x' * 100
 
@@ -186,6 +187,9 @@ LONG = 'x' * 100
     ('Tag,Address\na,1\n"b,2\nc,3\n', [f'FILE:3:1: {OPEN}']),
     ('"Tag,Address\na,1\n', [f'FILE:1:1: {OPEN}']), ('Tag,Address\na,"1', [f'FILE:2:2: {OPEN}']),
     ('Tag,Address\na,"', [f'FILE:2:2: {OPEN}']),
+    *((f'Tag{mark}Length\n"x{mark}""y""" {mark} "5 ""in"" {mark} "\u2002\n{row}\n', [
+        f'FILE:3:2: {AFTER}'])
+      for mark in ',;\t' for row in (f'a{mark}"1"0', f'"a" {mark} "5" pipe', f'{mark}"5""" "')),
     ('Tag,Address\r\na,"1\r\n# c\r\n', [f'FILE:2:2: {OPEN}']),
     ('Tag,Address\na, "1""\n', [f'FILE:2:2: {OPEN}']),
     ('Tag,Address\n"a,1\nb,2\n"c,3\nd,4\n', [f'FILE:2:1: {OPEN}', f'FILE:4:1: {OPEN}']),
