@@ -191,15 +191,21 @@ def _meant(word: str, rows: Collection[str]) -> str:
 
 def _check_options(options: argparse.Namespace, targets: Targets) -> None:
     """Raise ConfigurationError if an option contradicts rows of a map, or has no effect."""
-    station = _station(options)
-    problems = [] if targets.addresses else [
+    if targets.addresses:
+        check_via(options, targets.routes)
+        return
+    problems = [
         Problem(f'--{name.replace("_", "-")}', 'is for addresses; for tags the map has this value')
         for name in _FOR_ADDRESSES if getattr(options, name, None) is not None]
-    if not targets.addresses:
-        problems += [Problem('--station', f'the map has {row.tag} at station {row.station}')
-                     for row in targets.rows if options.station not in (None, row.station)]
-    elif options.via not in (None, gateway := targets.routes.get(station, options.via)):
-        where = 'on the line itself' if gateway == station else f'behind gateway {gateway}'
-        problems.append(Problem('--via', f'the map has station {station} {where}'))
+    problems += [Problem('--station', f'the map has {row.tag} at station {row.station}')
+                 for row in targets.rows if options.station not in (None, row.station)]
     if problems:
         raise ConfigurationError(problems)
+
+
+def check_via(options: argparse.Namespace, routes: dict[int, int]) -> None:
+    """Raise ConfigurationError if the option contradicts the gateway of the station in a map."""
+    station = _station(options)
+    if options.via not in (None, gateway := routes.get(station, options.via)):
+        where = 'on the line itself' if gateway == station else f'behind gateway {gateway}'
+        raise ConfigurationError([Problem('--via', f'the map has station {station} {where}')])

@@ -314,6 +314,8 @@ def test_plc_behind_a_gateway(tmp_path: Path, capsys: Output) -> None:
         path = tmp_path / 'map.csv'
         path.write_text(capsys.readouterr().out, encoding='utf-8')
         assert main(['files', '5', '--map', str(path), '--port', name]) == 0
+        assert main(['files', '5', '--map', str(path), '--port', name, '--via', '9']) == 2
+        assert '--via: the map has station 5 behind gateway 10\n' in capsys.readouterr().err
     mappings, problems = load_mappings(str(path))
     assert problems == []
     assert {(mapping.station, mapping.via) for mapping in mappings} == {(5, 10)}

@@ -29,7 +29,7 @@ from abdf1_ros.cli.plc import files
 from abdf1_ros.cli.plc.asking import ask, family_of
 from abdf1_ros.cli.plc.options import add_plc_type, add_station, stations_option
 from abdf1_ros.cli.plc.session import complain, Session
-from abdf1_ros.cli.plc.targets import routes_of, rows_of_map, Targets
+from abdf1_ros.cli.plc.targets import check_via, routes_of, rows_of_map, Targets
 from abdf1_ros.cli.terminal import EXIT_FAILED, Progress
 from abdf1_ros.pccc.file_search import DataFile
 from abdf1_ros.problems import ConfigurationError, Problem
@@ -51,8 +51,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Ask the station for its files; print them, rows for them, or faults of a map."""
     mappings = rows_of_map(options.map)
-    return ask(options, partial(_files, mappings=mappings),
-               Targets([], {}, routes=routes_of(mappings)))
+    routes = routes_of(mappings)
+    check_via(options, routes)
+    return ask(options, partial(_files, mappings=mappings), Targets([], {}, routes=routes))
 
 
 def _files(options: argparse.Namespace, session: Session, mappings: Rows) -> int:
