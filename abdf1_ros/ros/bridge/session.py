@@ -281,8 +281,7 @@ class BridgeSession:
             return  # the attempt has failed for the same reason as the last one
         self._port_text = state.text
         self._is_ours, self._opened = False, line_time()
-        if not state.is_open:
-            self._forget_connection()
+        self._forget_connection()
         self.events.port_changed()
         self._publish_active()
         # a spare does not log this: a device server may accept and close its connection every
