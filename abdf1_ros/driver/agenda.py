@@ -124,6 +124,7 @@ class Agenda:
         self._held_until = math.inf  # when a waiting guest has its share (clock value in s)
         self._tasks = tasks
         self._own_in_a_row = 0
+        self._last_read: int | None = None  # the station of the last read between own writes
         self._was_silent = False  # the station of the last own write
         self._questions = 0  # on a connection that has not been heard
         self._next_question = -math.inf  # after the quick questions (clock value in s)
@@ -177,9 +178,13 @@ class Agenda:
         if self._interlocks.is_ending:
             # A read of a PLC that fails now could take all the time that is left (rule 5).
             self._own_in_a_row, self._was_silent = 0, False
-        if self._own_in_a_row >= OWN_IN_A_ROW and (job := self._check_or_read(now, busy)):
-            self._own_in_a_row = 0
-            return job
+        if self._own_in_a_row >= OWN_IN_A_ROW:
+            if busy and self._last_read is not None and self._last_read not in busy:
+                # Stations take turns: with eight, the read might be for the same one each time.
+                self._last_read = None
+            elif job := self._check_or_read(now, busy):
+                self._own_in_a_row, self._last_read = 0, job.station
+                return job
         # Remaining packets of a long fallback go first: heartbeats that are always due would keep
         # them waiting. Where the fallback stands, heartbeats count and must not wait for it.
         # A packet to a silent station takes a whole Timeout: a write to a living one goes between.

@@ -364,6 +364,7 @@ PLANTS = [
     Worst('Standard', 3, 5, lost=0.5, length=2, mute=frozenset((1,)), alive=frozenset((2,))),
     Worst('Standard', 8, 1, **LATE, mute=frozenset((3, 4, 5, 7, 8)),  # type: ignore[arg-type]
           silent=frozenset((6,)), alive=frozenset((1, 2)), baud=115200),
+    Worst('Standard', 8, 2, timeout=200, lost=1.0, delay=0.34, travel=0.09),
     Worst('Peer', 1, 5, **LATE, length=2),  # type: ignore[arg-type]
     Worst('Peer', 1, 30, nak_retries=0, enq_retries=3, lost=0.5, lose_commands=False,
           mute=frozenset((1,))),
