@@ -178,12 +178,13 @@ class Agenda:
         if self._interlocks.is_ending:
             # A read of a PLC that fails now could take all the time that is left (rule 5).
             self._own_in_a_row, self._was_silent = 0, False
-        if self._own_in_a_row >= OWN_IN_A_ROW:
+        if self._own_in_a_row >= OWN_IN_A_ROW and not self._interlocks.is_beats_turn(now):
             if busy and self._last_read is not None and self._last_read not in busy:
                 # Stations take turns: with eight, the read might be for the same one each time.
                 self._last_read = None
             elif job := self._check_or_read(now, busy):
                 self._own_in_a_row, self._last_read = 0, job.station
+                self._interlocks.conditions.is_beats_turn = True
                 return job
         # Remaining packets of a long fallback go first: heartbeats that are always due would keep
         # them waiting. Where the fallback stands, heartbeats count and must not wait for it.

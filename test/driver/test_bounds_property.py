@@ -33,9 +33,10 @@ from typing import Any
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import ACK, Code, message_frame
-from abdf1_ros.df1.packet import Packet, STS_NOT_DELIVERED
+from abdf1_ros.df1.packet import BROADCAST, Packet, STS_NOT_DELIVERED
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave
+from abdf1_ros.driver.guests import ShareAccess
 from abdf1_ros.driver.interlocks.plc import Plc
 from abdf1_ros.driver.job_tasks import Job
 from abdf1_ros.driver.settings import DriverSettings
@@ -479,6 +480,18 @@ def test_rule_16_no_heartbeat_of_a_living_bridge_pauses_for_longer_than_its_pres
     pauses = BoundBench(plant).pauses()
     assert late_of(pauses) == {}
     assert min(pause for _, pause in pauses.values()) > 0.9
+
+
+def test_rule_10_second_writes_and_heartbeats_take_turns_on_a_full_line() -> None:
+    bound = BoundBench(Worst('Message', 3, 4))
+    bound.bench.run(3.0)
+    Program(bound.bench, ShareAccess.ALL).ask(b'\0', BROADCAST)  # it may be any write
+    bound.bench.run(0.95)  # each is written once
+    for plc in bound.plcs.values():
+        plc.faults.delay, bound.losses.is_due = 0.45, True
+    bound.bench.run(40.0)
+    assert max(bound.gaps.values()) < 6.96  # the preset
+    assert {row.words.again_at for row in bound.bench.driver.interlocks.fallbacks} == {math.inf}
 
 
 @pytest.mark.parametrize('mode', ['Message', 'Standard', 'Peer'])

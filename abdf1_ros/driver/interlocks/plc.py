@@ -64,12 +64,16 @@ class Conditions:
     - ``executor``: when the ROS executor ran last.
     - ``messages``: publication time of the last accepted message of each topic.
     - ``is_ending``: the bridge ends; ``ended``: when the end began, infinite before it.
+    - ``gave_way``: when heartbeats last gave way to a fallback that stands.
+    - ``is_beats_turn``: they have just given way to such a fallback, or to a read.
     """
 
     executor: float = -math.inf
     messages: dict[str, float] = field(default_factory=dict)
     is_ending: bool = False
     ended: float = math.inf
+    gave_way: float = -math.inf
+    is_beats_turn: bool = False
 
     @property
     def are_all_due(self) -> bool:
@@ -218,15 +222,22 @@ class Plc:
         first. In (3) the row with the fewest tries goes first, then the row whose last try is
         oldest. Otherwise a 0 that is due each second would take all turns. Silent PLCs get only
         the time of probes. At the end a silent PLC has one try for each row.
+
+        Heartbeats that are due give way to one fallback that stands, after each of them has had a
+        turn. All such fallbacks could take longer than the preset of a PLC.
         """
+        conditions = self._conditions
         if self._has_last_try:
-            return (1, 1, row.tried) if row.tried < self._conditions.ended else None
+            return (1, 1, row.tried) if row.tried < conditions.ended else None
         is_zero = isinstance(row, HeartbeatRow) and row.wants_zero
         is_beat = isinstance(row, HeartbeatRow) and not row.wants_zero
         is_ill = self.failures > 0 or not self._stations[self.station].replies_in_time
         if row.is_first_try and not is_beat:
             return 0, is_ill, not is_zero
         if not is_ill:
+            if isinstance(row, FallbackRow) and row.stands:
+                had_turn = now if conditions.is_beats_turn else conditions.gave_way
+                return 2, max(row.words.again_at, had_turn), row.tried
             return (2, row.tried) if is_beat else (1, 0, not is_zero, row.tried)
         if now < self._free_from:
             return None

@@ -279,17 +279,25 @@ class Interlocks(WriteListener):
 
     def _begin(self, plc: Plc, row: OwnRow, youngest: dict[Mapping, float],
                now: float) -> WriteJob:
-        expires = math.inf
+        expires, is_again = math.inf, False
         if isinstance(row, FallbackRow):
             self._writes.drop('fallback', now, row.mapping)
+            if is_again := row.stands:
+                self.conditions.gave_way = now
         elif not row.wants_zero:
             expires = plc.good_until(row, youngest)
+        self.conditions.is_beats_turn = is_again
         is_first = row.is_first_try
         write = row.take(now)
         plc.plan()
         is_last = self.conditions.are_all_due and not plc.is_active
         return WriteJob(write, self._writing, expires, is_free=is_first,
                         answer_within=LAST_ANSWER if is_last else math.inf)
+
+    def is_beats_turn(self, now: float) -> bool:
+        """Tell whether a heartbeat is due that has given way already."""
+        return self.conditions.is_beats_turn and any(
+            beat.due <= now and not beat.wants_zero for beat in self.heartbeats)
 
     def refresh(self, now: float, busy: Container[int] = ()) -> WriteJob | None:
         """
@@ -312,9 +320,12 @@ class Interlocks(WriteListener):
             and not self._by_mapping[job.write.mapping].stands
 
     def is_awaited(self, job: Job) -> bool:
-        """Tell whether a job writes a fallback, and a message waits for its end."""
-        return isinstance(job, WriteJob) and job.is_own \
-            and job.write.mapping in self._writes.youngest()
+        """Tell whether a job writes a fallback for the second time, or a message waits for it."""
+        if not isinstance(job, WriteJob) or not job.is_own:
+            return False
+        row = self._by_mapping[job.write.mapping]
+        return row.words.again_at <= self._writing.line.now \
+            or row.mapping in self._writes.youngest()
 
     def _own_ended(self, claim: Claim, write: Write, now: float) -> None:
         """Record how one of our own writes ended."""
