@@ -181,6 +181,7 @@ def test_row_with_other_values_has_a_publisher_that_kept_none(
     topics: Any = ReadTopics
     topics(node, published).offer({old: point})
     assert node.noted(topics(node, published).open, {new: point}) == notes
+    assert node.noted(topics(node, published, ('/dev/other',)).open, {new: point}) == ['+a']
 
 
 @pytest.mark.parametrize(('old', 'new', 'is_fit'), [

@@ -115,7 +115,8 @@ class BridgeSession:
         self._surroundings = surroundings
         node, parameters = surroundings.node, configuration.parameters
         network, mappings = configuration.network, configuration.mappings
-        self.reads = ReadTopics(node, surroundings.published)
+        self.reads = ReadTopics(
+            node, surroundings.published, (configuration.port, *network.ports[1:]))
         seen = Seen(lambda: surroundings.names.text, latest=self.reads.latest,
                     diagnostics_period=parameters.diagnostics_period)
         self.events = LineEvents(
