@@ -119,19 +119,17 @@ def map_rows(found: Sequence[DataFile], station: int, plc_type: PlcType,
             continue
         per_element = FAMILIES[plc_type].layout(kind).words
         packet = dialect_of(plc_type, processor=processor).max_read(kind)
-        length = 1 if kind is FileType.STRING else min(
-            entry.elements * per_element, packet // per_element * per_element)
+        elements = 1 if kind is FileType.STRING else min(entry.elements, packet // per_element)
+        # Length counts words of structures, and elements of other files.
+        length = elements * (per_element if kind.is_structure else 1)
         start = Address(FAMILIES[plc_type].addressing, kind, entry.number, 0)
         if type_fault(start, types_of(start)[0], length):
             runs = ', '.join(str(run) for run, *_ in named_runs(start))
             yield f'# {entry}: values of several types, at {runs}'
             continue
-        # Length counts words of structures, and elements of other files.
-        if not kind.is_structure:
-            length = max(1, length // per_element)
-        if length < entry.elements and not kind.is_structure and kind is not FileType.STRING:
+        if elements < entry.elements:
             yield (f'# {entry} has {entry.elements} elements; this row of one packet reads '
-                   f'{length}')
+                   f'{elements}')
         number = '' if kind is FileType.STATUS else entry.number
         yield (f'{kind.value.lower()}{entry.number},Read,{kind.value}{number}:0,{station},'
                f'{plc_type.value},{processor_cell(processor)},{length},{_DRAFT_PERIOD}'

@@ -230,8 +230,8 @@ def test_files_are_found_with_type_and_length(
 @pytest.mark.parametrize(('station', 'rows', 'comments'), [
     ('1', 's2 S2:0 32, b3 B3:0 5, t4 T4:0 30, n7 N7:0 110, f8 F8:0 10, st9 ST9:0 1, a12 A12:0 7, '
      'd13 D13:0 110', ['O0: addressed by rack or slot', *(
-         f'{name} elements; this row of one packet reads 110' for name in (
-             'N7 has 256', 'D13 has 2000'))]),
+         f'{name} elements; this row of one packet reads {count}' for name, count in (
+             ('N7 has 256', 110), ('ST9 has 2', 1), ('D13 has 2000', 110)))]),
     ('2', 's2 S2:0 64, b3 B3:0 1, n7 N7:0 100, f10 F10:0 4', ['I1: addressed by rack or slot'])])
 def test_files_become_rows_of_a_map(port: str, station: str, rows: str, comments: list[str],
                                     tmp_path: Path, capsys: Output) -> None:
