@@ -394,15 +394,18 @@ def test_number_that_yaml_takes_for_octal_is_told(
     path = tmp_path / 'shared.yaml'
     path.write_text(f'{section}:\n  ros__parameters:\n    net:\n      station: 010\n'
                     '      baud: 9600\n      timeout: "0500"\n      nak_retries: 03\n'
+                    '    poll_list: [1, 011]\n'
                     '/other:\n  ros__parameters:\n    write_timeout: 010\n',
                     encoding='utf-8')
     assert problems_of(make_node(files), Arguments([str(path)])) == [
-        f'{path}:4:7: net.station: 010 is octal in YAML; write 10 or 8']
+        f'{path}:4:7: net.station: 010 is octal in YAML; write 10 or 8',
+        f'{path}:8:5: poll_list: 011 is octal in YAML; write 11 or 9']
 
 
 @pytest.mark.parametrize(('rule', 'expected'), [
     ('net.station:=010', 'net.station: 010 is octal in YAML; write 10 or 8'),
     ('parameters:net.station:=010', 'net.station: 010 is octal in YAML; write 10 or 8'),
+    ('poll_list:=[010, 12]', 'poll_list: 010 is octal in YAML; write 10 or 8'),
     ('net.station:="010"', None), ('net.station:=07', None), ('camera:gain:=010', None),
     ('camera:read_only:=true', 'camera:read_only: this node is /parameters; leave out "camera:"'),
     ('gain:=3', 'gain: there is no such parameter; another version may have it'),

@@ -34,7 +34,7 @@ from abdf1_ros.plan.usable_rows import usable_rows
 from abdf1_ros.problems import ConfigurationError, Place, Problem
 from abdf1_ros.ros.parameters.arguments import Arguments, is_for
 from abdf1_ros.ros.parameters.file_watch import FileWatch
-from abdf1_ros.ros.parameters.files import parameters_in
+from abdf1_ros.ros.parameters.files import parameters_in, typed_numbers
 from abdf1_ros.ros.parameters.shown import descriptor_of, map_cells, MOST_SHOWN_ROWS, text_of
 from abdf1_ros.settings.columns import COLUMNS, MAX_PERIOD
 from abdf1_ros.settings.map_file import load_mappings
@@ -320,14 +320,14 @@ def wrong_names(node: Node, given: Given, arguments: Arguments, known: Collectio
     problems = [*arguments.misdirected(full_name, usual_name, known)]
     typed, only_ours = arguments.typed_for(full_name), arguments.only_for(full_name)
     found = set(_OF_RCLPY)
-    for section, name, place, number in parameters_in(arguments.files):
+    for section, name, place, numbers in parameters_in(arguments.files):
         if section == full_name:
             found.add(name)
             if not (name in known or name in _OF_RCLPY or _is_of_map(name)):
                 problems.append(Problem(place, (
                     f'{name}: there is no such parameter; {_nearest(name, known, begins, 0.5)}')))
         if name in known and is_for(section, full_name):
-            problems += _octal(place, f'{name}: ', number)
+            problems += _octal(place, f'{name}: ', numbers)
     for name in given:
         is_other = name.startswith('qos_overrides.') and f'.{full_name}/' not in name
         if name in found or name in known or _is_of_map(name) or is_other:
@@ -335,14 +335,13 @@ def wrong_names(node: Node, given: Given, arguments: Arguments, known: Collectio
         if hint := _nearest(name, known, begins, 0.5 if name in only_ours else 0.75):
             problems.append(Problem(f'parameter {name}', f'there is no such parameter; {hint}'))
     for name in given.keys() & typed.keys() & {*known}:
-        problems += _octal(f'parameter {name}', '', typed[name])
+        problems += _octal(f'parameter {name}', '', typed_numbers(typed[name]))
     return problems
 
 
-def _octal(place: Place | str, name: str, number: str) -> list[Problem]:
-    octal = octal_of(number)
-    return [] if octal is None else [Problem(
-        place, f'{name}{number} is octal in YAML; write {int(number)} or {octal}')]
+def _octal(place: Place | str, name: str, numbers: Sequence[str]) -> list[Problem]:
+    return [Problem(place, f'{name}{number} is octal in YAML; write {int(number)} or {octal}')
+            for number in numbers if (octal := octal_of(number)) is not None]
 
 
 def _is_of_map(name: str) -> bool:

@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager, ExitStack
+from contextlib import contextmanager, ExitStack, suppress
 from pathlib import Path
 import re
 from tempfile import TemporaryDirectory
@@ -161,13 +161,26 @@ def node_sections(tree: yaml.Node | None, above: str = '', line: int = 1,
             yield above, line, below
 
 
-def parameters_in(files: Iterable[str]) -> Iterator[tuple[str, str, Place, str]]:
-    """Yield each parameter: section, name, place, and its text if it is a whole number."""
+def parameters_in(files: Iterable[str]) -> Iterator[tuple[str, str, Place, list[str]]]:
+    """Yield each parameter: section, name, place, and the texts of its whole numbers."""
     for path in files:
         for section, _, parameters in node_sections(parameter_tree(path)):
             for name, key, value in _parameters(parameters):
-                mark, number = key.start_mark, value.value if value.tag.endswith(':int') else ''
-                yield section, name, Place(path, mark.line + 1, mark.column + 1), number
+                mark = key.start_mark
+                yield (section, name, Place(path, mark.line + 1, mark.column + 1),
+                       _whole_numbers(value))
+
+
+def typed_numbers(text: str) -> list[str]:
+    """Return the texts of the whole numbers in a value of the command line."""
+    with suppress(yaml.YAMLError):
+        return _whole_numbers(yaml.compose(text))
+    return []
+
+
+def _whole_numbers(value: yaml.Node | None) -> list[str]:
+    values = value.value if isinstance(value, yaml.SequenceNode) else [value]
+    return [each.value for each in values if each is not None and each.tag.endswith(':int')]
 
 
 def _parameters(tree: yaml.Node, above: str = '') -> Iterator[tuple[str, yaml.Node, yaml.Node]]:
