@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 import os
 from pathlib import Path
+import threading
 from typing import Any
 from unittest.mock import Mock
 
@@ -43,6 +44,7 @@ from std_msgs.msg import Float32MultiArray, Int16MultiArray, String, UInt16Multi
 from std_srvs.srv import SetBool, Trigger
 from support.commands import Output
 from support.mappings import make_mapping
+from support.ptys import PATIENCE
 from support.ros import (
     BridgeCell,
     details,
@@ -419,10 +421,21 @@ def _replaced(path: Path) -> None:
 @pytest.mark.parametrize('change', [_written, _replaced, Path.unlink])
 def test_change_is_seen(file: Path, change: Callable[[Path], None]) -> None:
     watch = FileWatch([str(file), '/nowhere'])
-    assert watch.changed(0.0) == []
-    change(file)
-    assert watch.changed(1.9) == []  # it looks every 2 s
-    assert watch.changed(10.0) == ['map.csv']
+    for now, found in (0.0, []), (1.9, []), (10.0, ['map.csv']):  # it looks every 2 s
+        watch.changed(now)
+        watch.looking.join(PATIENCE)
+        assert watch.changed(now) == found
+        if not now:
+            change(file)
+
+
+def test_mount_that_hangs_holds_up_nothing_else(
+        file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    watch, answers = FileWatch([str(file)]), threading.Event()
+    monkeypatch.setattr(Path, 'stat', lambda path: answers.wait(PATIENCE) and os.stat(path))
+    assert [watch.changed(now) for now in (0.0, 10.0)] == [[], []]
+    answers.set()
+    watch.looking.join(PATIENCE)
 
 
 ROW = make_mapping(tag='speed')

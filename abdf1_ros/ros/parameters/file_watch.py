@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
+import threading
 
 _Stamp = tuple[int, int, int]
 
@@ -25,20 +26,29 @@ PERIOD = 2.0  # s between two looks
 
 
 class FileWatch:
-    """Remembers the state of files, to notice changes; make it before you read the files."""
+    """
+    Remembers the state of files, to notice changes; make it before you read the files.
+
+    It looks in a thread of its own, because a mount without its server may hang for ever.
+    """
 
     def __init__(self, paths: Iterable[str] = ()) -> None:
         self._stamps = {path: _stamp(path) for path in paths}
         self._changed: list[str] = []
         self._next_look = 0.0
+        self.looking = threading.Thread()
 
     def changed(self, now: float) -> list[str]:
         """Return the names of files that have changed or gone, as of the last look."""
-        if now >= self._next_look:
+        if now >= self._next_look and not self.looking.is_alive():
             self._next_look = now + PERIOD
-            self._changed = [Path(path).name for path, stamp in self._stamps.items()
-                             if _stamp(path) != stamp]
+            self.looking = threading.Thread(target=self._look, name='files', daemon=True)
+            self.looking.start()
         return self._changed
+
+    def _look(self) -> None:
+        self._changed = [Path(path).name for path, stamp in self._stamps.items()
+                         if _stamp(path) != stamp]
 
 
 def _stamp(path: str) -> _Stamp | None:
