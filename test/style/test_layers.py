@@ -27,7 +27,7 @@ _SANS_IO = {'time', 'threading', 'serial', 'select', 'socket', 'os', 'rclpy'}
 # The shells that wait for signals, input or bytes; only one of them opens a port.
 _WAITING = {'select', 'threading'}
 _MAY_WAIT = ('signals.py', 'testing.py', 'ports/', 'ros/lines.py', 'ros/process/main.py',
-             'ros/callbacks.py', 'console.py', 'cli/simulator.py',
+             'ros/callbacks.py', 'ros/parameters/file_watch.py', 'console.py', 'cli/simulator.py',
              'cli/sniff.py', 'cli/plc/watch.py')
 
 
