@@ -349,6 +349,7 @@ LISTENING = {'Com_Port': '/dev/ttyS0', 'Mode': 'Listen'}
     ({'Listen_Port': '0'}, 'Listen_Port = "0" should be a number from 1'),
     ({'Listen_Port': '²'}, 'Listen_Port = "²" should be a number from 1'),
     ({'Listen_Port': '1'}, 'Listen_Port: 1 is the device of Com_Port, too'),
+    ({'Com_Port': '1', 'Listen_Port': '/dev/ttyS0'}, ' /dev/ttyS0 is the device of Com_Port, too'),
     ({'Com_Port': 'rfc2217://h:1'}, 'RFC 2217 sets the lines of the far port'),
     ({'Com_Port': 'socket://h:1', 'Listen_Port': '/dev/ttyS1'},
      'both ports must be devices of this machine')])
