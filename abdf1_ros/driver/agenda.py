@@ -208,7 +208,7 @@ class Agenda:
         return self._checks.find_due(now) and self._check(now, busy) or self.read(now, busy)
 
     def _usual(self, now: float, busy: Container[int]) -> Job | None:
-        if rewriting := self._tasks.continued(now, busy, _is_rewriting):
+        if self._tasks.waiting and (rewriting := self._tasks.continued(now, busy, _is_rewriting)):
             self._writes_in_a_row += 1
             return rewriting
         has_writes = self._writes.waiting or self._tasks.waiting
