@@ -371,8 +371,8 @@ def parse_options(args: Sequence[str] | None) -> argparse.Namespace:
                              'do')
     parser.add_argument('--baud', type=whole_option, choices=BAUD_RATES, default=9600,
                         help='baud rate of the serial port (default: %(default)s)')
-    parser.add_argument('--check', choices=[check.value for check in Checksum],
-                        default=Checksum.CRC.value,
+    parser.add_argument('--check', type=str.upper,
+                        choices=[check.value for check in Checksum], default=Checksum.CRC.value,
                         help='check of messages (default: %(default)s)')
     parser.add_argument('--at', metavar='"SECONDS COMMAND"', action='append', default=[],
                         help='carry out a command SECONDS after the start; may be repeated')

@@ -290,8 +290,8 @@ def parse(args: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument('--baud', type=whole_option, choices=BAUD_RATES,
                         help=f'baud rate of the ports (default: {_DEFAULT_BAUD}); for a file: '
                              'baud rate of the recorded line, to compute its load')
-    parser.add_argument('--parity', choices=PARITIES, default='None',
-                        help='parity of the ports (default: %(default)s)')
+    parser.add_argument('--parity', type=str.capitalize, choices=PARITIES,
+                        default='None', help='parity of the ports (default: %(default)s)')
     parser.add_argument('--check', type=str.lower, choices=(*_CHECKS, _AUTO), default=_AUTO,
                         help='check of messages (default: found from the traffic)')
     parser.add_argument('--duplex', type=str.lower, choices=(*_DUPLEX, _AUTO), default=_AUTO,

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import dataclass
+from enum import Enum
 
 from abdf1_ros.cli.plc.data import Radix
 from abdf1_ros.cli.plc.line import DEFAULTS, MODES
@@ -134,12 +135,19 @@ def add_data_options(parser: argparse.ArgumentParser,
     add_plc_type(group)
     group.add_argument('--type', type=type_name, choices=[kind.value for kind in ValueType],
                        help='type of the values (default: the natural type of the file)')
-    group.add_argument('--word-order', choices=[order.value for order in WordOrder],
-                       help='32-bit values: the word that comes first')
-    group.add_argument('--processor', choices=[entry.value for entry in Processor],
-                       help='processor of an SLC or MicroLogix (default: the PLC is asked)')
-    group.add_argument('--access', choices=[access.value for access in Access],
-                       help='commands that reach the words, if a family has several ways')
+    _add_choice(group, '--word-order', WordOrder, '32-bit values: the word that comes first')
+    _add_choice(group, '--processor', Processor,
+                'processor of an SLC or MicroLogix (default: the PLC is asked)')
+    _add_choice(group, '--access', Access,
+                'commands that reach the words, if a family has several ways')
+
+
+def _add_choice(group: argparse._ArgumentGroup, name: str, kind: type[Enum],
+                text: str) -> None:
+    """Add an option for a value of an enumeration, in any letter case as in a map file."""
+    values = {member.value.lower(): member.value for member in kind}
+    group.add_argument(name, type=lambda word: values.get(word.lower(), word),
+                       choices=[*values.values()], help=text)
 
 
 def add_addresses(parser: argparse.ArgumentParser) -> None:

@@ -36,7 +36,7 @@ from support.simulator_process import Files
     (1, 'N7:0', ('--length', '2'), ['N7:0 1200 -800']),
     (1, 'F8:0', ('--length', '3'), ['F8:0 12.5 40.25 -3.5']),
     (1, 'A10:0', ('--type', 'string', '--length', '3'), ["A10:0 'abc'"]),
-    (1, 'N7:6', ('--type', 'uint32', '--word-order', 'High'), ['N7:6 65538']),
+    (1, 'N7:6', ('--type', 'uint32', '--word-order', 'high'), ['N7:6 65538']),
     (1, 'T4:1-1', (), ['T4:1 8192 DN', 'T4:1.PRE 500', 'T4:1.ACC 120']),
     (1, 'T4:1', (), ['T4:1 8192 DN', 'T4:1.PRE 500', 'T4:1.ACC 120']),
     (1, 'T4:1.ACC', (), ['T4:1.ACC 120']),
