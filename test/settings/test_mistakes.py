@@ -218,8 +218,10 @@ PORT = ('should be a number from 1, a device path such as /dev/ttyUSB0, socket:/
     ('Station,Com_Port\n5,\n', [
         '2:2 (Com_Port): Com_Port is empty: the port is /dev/ttyS0, unless the parameter port '
         'or net.com_port names a port']),
-    ('Com_Port,Station,Baud,Mode\n/dev/ttyUSB0,5\n', [
-        '2: the row ends before Baud, Mode: the defaults apply']),
+    ('Station,Com_Port,Baud,Mode\n5,\n', [
+        '2: the row ends before Baud, Mode: the defaults apply',
+        '2:2 (Com_Port): Com_Port is empty: the port is /dev/ttyS0, unless the parameter port '
+        'or net.com_port names a port']),
     ('Com_Port,Timeout\n1,1 s\n', [
         '!2:2 (Timeout): Timeout = "1 s" should be a whole number from 0 to 360000 ms']),
     ('Com_Port\n192.168.0.9:4001\n', [f'!2:1 (Com_Port): Com_Port = "192.168.0.9:4001" {PORT}; '
