@@ -16,18 +16,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from contextlib import ExitStack, suppress
 import os
 import socket
 import time
 from typing import Self, TypeVar
 
+from abdf1_ros.ros.untyped import RosEntity
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.logging import get_logger
 from rclpy.node import Node, NodeNameNonExistentError
 
 _Result = TypeVar('_Result')
+
+_LOG = get_logger('observer')
 
 
 def claim_domain() -> tuple[int, socket.socket]:
@@ -57,6 +61,17 @@ def graph_hint() -> str:
     return '; ROS_DISCOVERY_SERVER is set: set ROS_SUPER_CLIENT=TRUE too' if is_client else ''
 
 
+class _PatientExecutor(SingleThreadedExecutor):
+    """Passes over a message that rclpy cannot take, for example one that DDS has damaged."""
+
+    def _take_subscription(self, sub: RosEntity) -> Callable[[], Awaitable[None]] | None:
+        try:
+            return super()._take_subscription(sub)  # type: ignore[no-any-return, no-untyped-call]
+        except RuntimeError as error:
+            _LOG.warning(f'a message on {sub.topic_name} cannot be taken: {error}', once=True)
+            return None
+
+
 class ObservingNode:
     """
     A node with an executor of its own; nodes that are added to the executor run too.
@@ -73,7 +88,7 @@ class ObservingNode:
             self.context.init(args=[*args])
         self.node = Node(name, context=self.context, enable_rosout=not is_quiet,
                          start_parameter_services=not is_quiet)
-        self.executor = SingleThreadedExecutor(context=self.context)
+        self.executor = _PatientExecutor(context=self.context)
         self.executor.add_node(self.node)
 
     def __enter__(self) -> Self:
