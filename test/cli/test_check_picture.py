@@ -93,8 +93,8 @@ def test_shares_of_the_line_and_the_table_tell_all_reads(tmp_path: Path, capsys:
 
 def test_bars_are_in_proportion_to_their_times() -> None:
     svg = browser.Elements(drawing([Lane('a', [
-        Bar(20, 40, Look.ASK, 'x', ('n' * 40, 'f' * 39)),
-        Bar(40, 100, Look.WAIT, 'y', row=1)], rows=2)], 20, 100, 'ms', limit=40))
+        Bar(520, 540, Look.ASK, 'x', ('n' * 40, 'f' * 39)),
+        Bar(540, 600, Look.WAIT, 'y', row=1)], rows=2)], 520, 600, 'ms', limit=540))
     (first,), (second,), (limit,) = ([rect for _, rect in svg.found if rect.get('class') == look]
                                      for look in ('ask', 'wait', 'limit'))
     assert (float(first['x']), svg.found[0][1]['height']) == (NAMES, '54')
@@ -102,7 +102,7 @@ def test_bars_are_in_proportion_to_their_times() -> None:
     assert float(second['width']) == pytest.approx(3 * float(first['width']), abs=0.2)
     assert (int(second['y']) - int(first['y']), limit['x1']) == (14, second['x'])
     assert [text for text in svg.texts if text.strip()] == [
-        'a', *map(str, range(20, 101, 10)), 'ms', 'x', 'f' * 39, 'y']
+        'a', *map(str, range(520, 601, 10)), 'ms', 'x', 'f' * 39, 'y']
     assert [float(line['x1']) for _, line in svg.found if line.get('class') == 'grid'] == \
         pytest.approx([NAMES + 128.75 * number for number in range(9)], abs=0.1)
 

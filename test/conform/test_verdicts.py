@@ -136,6 +136,7 @@ FAULTS = [(target, habit, name) for targets, habit, name in [
     ((Target.PEER,), Habit.RESPONSE_INSIDE_IGNORED, 'embedded-response'),
     ((Target.PEER,), Habit.DROPS_MESSAGE_AROUND, 'embedded-response'),
     ((Target.PEER,), Habit.ENQUIRES_ALWAYS, 'no-needless-enquiry'),
+    ((Target.PEER,), Habit.REPEATS_AFTER_ACK, 'silence-is-enquired'),
     ((Target.PEER, Target.CLIENT), Habit.NEVER_GIVES_UP, 'nak-limit'),
     ((Target.MASTER,), Habit.NO_ACK, 'polled-after-ack'),
     ((Target.MASTER,), Habit.CRC_WITHOUT_STATION, 'command-form'),

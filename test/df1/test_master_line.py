@@ -17,11 +17,13 @@
 from dataclasses import replace
 import itertools
 
+from abdf1_ros.df1 import frames
+from abdf1_ros.df1.frames import Frame, Poll
 from abdf1_ros.df1.master_line import MAX_FORWARDS
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.settings import LinkSettings, PollingSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave
-from abdf1_ros.errors import CommandExpired, StationInactive
+from abdf1_ros.errors import CommandExpired, CommandTimeout, StationInactive
 import pytest
 from support.cases import long_unless
 from support.multidrop import MasterBench, Slave
@@ -276,6 +278,18 @@ def test_slaves_that_never_stop_talking_leave_the_master_its_turns(
     assert rig.master.changes == []
     assert {number for number, *_ in rig.master.numbers()} == {2523}
     assert all(len(rig[number].served) > 50 for number in numbers)
+
+
+@BOTH
+def test_slave_that_repeats_one_message_for_ever_leaves_the_line_to_others(standard: bool) -> None:
+    rig = bench(standard, 7, 8)
+    rig.start()
+    old = frames.message_frame(rig.ask(7, run=0.3).command.reply().encode(), SETTINGS.checksum)
+    setattr(rig[7], 'handle', lambda symbol: {Poll: old, Frame: frames.ACK}.get(
+        type(symbol), b'') if getattr(symbol, 'station', None) == 7 else b'')
+    tasks = [rig.ask(number) for number in (7, 8)]
+    rig.run(2.0)
+    assert [type(task.result) for task in tasks] == [CommandTimeout, Packet]
 
 
 @BOTH

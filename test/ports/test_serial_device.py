@@ -15,7 +15,7 @@
 """Serial devices: how they are listed and opened, damaged characters, counts, and the end."""
 
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 import errno
 import fcntl
 import os
@@ -31,7 +31,7 @@ from abdf1_ros.line_names import number_of
 from abdf1_ros.ports import listing, serial_device
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.ownership import own
-from abdf1_ros.ports.serial_device import mark_damage, SerialDevice
+from abdf1_ros.ports.serial_device import hold_device, SerialDevice
 from abdf1_ros.ports.settings import PortSettings
 import pytest
 import serial
@@ -150,8 +150,11 @@ def test_marks_are_undone(marked: bytes, expected: list[bytes]) -> None:
 
 def test_system_doubles_what_looks_like_a_mark(pty: Pty, wake: int) -> None:
     theirs = os.open(pty.name, os.O_RDWR | os.O_NOCTTY)
-    mark_damage(theirs)
-    port = SerialDevice(theirs, lambda: os.close(theirs), is_marked=True)
+
+    def opened(stack: ExitStack) -> int:
+        stack.callback(os.close, theirs)
+        return theirs
+    port = hold_device(PortSettings(str(pty.name), parity='Even'), opened, SerialDevice)
     pty.write(b'\x01\xff\x02')
     data = b''
     while len(data) < 3:

@@ -29,6 +29,7 @@ from typing import Any
 from unittest.mock import MagicMock, Mock
 
 from abdf1_ros.cli.monitor.command import main, Screen
+from abdf1_ros.cli.monitor.node import NodeWatch
 from abdf1_ros.cli.monitor.view import Style, TextLine
 import pytest
 from std_msgs.msg import UInt16MultiArray
@@ -394,6 +395,9 @@ def test_a_node_that_is_not_there_is_said_with_those_that_are(
     *progress, told = refused(1, '--node', '/abdf1', '--wait', '3')
     assert progress and all('monitor: looking for /abdf1, ' in line for line in progress)
     assert told == 'monitor: there is no node /abdf1 within 3 s: --node may be one of ' + NODE
+    monkeypatch.setattr('abdf1_ros.cli.monitor.command.limit_output', lambda: None)
+    monkeypatch.setattr(NodeWatch, 'wait', lambda *_: signal.raise_signal(signal.SIGINT))
+    assert refused(0, '--node', '/abdf1') == []  # the user ends the search
 
 
 def test_topics_without_a_node_that_is_heard_point_to_another_user(refused: Refused) -> None:
