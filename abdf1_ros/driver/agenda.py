@@ -184,7 +184,7 @@ class Agenda:
                 self._last_read = None
             elif job := self._check_or_read(now, busy):
                 self._own_in_a_row, self._last_read = 0, job.station
-                self._interlocks.conditions.is_beats_turn = True
+                self._interlocks.beats_gave_way()
                 return job
         # Remaining packets of a long fallback go first: heartbeats that are always due would keep
         # them waiting. Where the fallback stands, heartbeats count and must not wait for it.

@@ -294,6 +294,10 @@ class Interlocks(WriteListener):
         return WriteJob(write, self._writing, expires, is_free=is_first,
                         answer_within=LAST_ANSWER if is_last else math.inf)
 
+    def beats_gave_way(self) -> None:
+        """Record that heartbeats gave way to a read: they go next."""
+        self.conditions.is_beats_turn = True
+
     def is_beats_turn(self, now: float) -> bool:
         """Tell whether a heartbeat is due that has given way already."""
         return self.conditions.is_beats_turn and any(
