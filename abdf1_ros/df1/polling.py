@@ -170,17 +170,19 @@ class StandardPollingMaster:
         normal = self._normal
         if normal.position == 0:
             normal.turn(self._machine.now)
-        group_size = self._polling.group_size or len(normal.stations)
-        visited = 0
-        while normal.position < len(normal.stations) and visited < group_size:
+        room = self._polling.group_size or len(normal.stations)
+        # Inactive stations behind the group belong to it: a group of them alone would be a pause.
+        while normal.position < len(normal.stations):
             number = normal.stations[normal.position]
+            is_active = self._is_active(number)
+            if is_active and not room:
+                return
             normal.position += 1
-            if self._is_active(number):
-                visited += 1
+            if is_active:
+                room -= 1
                 yield from self._visit(number, source)
-        if normal.position >= len(normal.stations):
-            normal.position = 0
-            yield from self._visit_inactive(normal, source)
+        normal.position = 0
+        yield from self._visit_inactive(normal, source)
 
     def _visit_inactive(self, polled: _PollList, source: TaskSource) -> Procedure:
         """Poll one inactive station of a list, if the share of probes allows."""
