@@ -38,13 +38,13 @@ from abdf1_ros.messages import Event
 # is noticed.
 _LOOK = 0.1
 
-# Seconds after a pause of this process for which bytes are dropped: they may be old bytes of a
-# buffer.
-_OLD = 0.5
-
 # If the line needs more than these seconds for the bytes of some reads, they have waited in a
 # buffer.
 _BUFFERED = 0.3
+
+# Seconds for which bytes are dropped after a pause of this process, or after bytes that have
+# waited. A network brings such bytes in pieces, with pauses between them.
+_OLD = 0.5
 
 
 class SecondPort(bytes):
@@ -69,32 +69,26 @@ class ListeningMachine(Machine):
     Give all bytes to ``listener``, and send none.
 
     After a pause of this process the age of the first bytes is unknown: they are dropped. So are
-    the bytes of a connection that come faster than the line brings them, until none are left.
+    the bytes of a connection that come faster than the line brings them.
     """
 
     listener: ByteListener
     _old_until = -math.inf
-    _is_old = False  # bytes have waited in a buffer
-    _has_more = False
     _line_until = -math.inf  # when the bytes of the last reads end on the line
 
-    def came(self, count: int, now: float, *, has_more: bool) -> None:
+    def came(self, count: int, now: float) -> None:
         """Judge whether the bytes of a read are old."""
-        was_old = self._is_old
         self._line_until = max(self._line_until, now) + count * self.timing.char_time
-        self._is_old = (now < self._old_until or (was_old and self._has_more)
-                        or self._line_until > now + _BUFFERED)
-        self._has_more = has_more
-        if self._is_old:
-            self._line_until = now
-            if not was_old:
+        if self._line_until > now + _BUFFERED:
+            if now >= self._old_until:
                 self.listener.forget(now)
+            self._line_until, self._old_until = now, now + _OLD
 
     def receive_data(self, data: bytes, now: float) -> None:
         """Take bytes from the line."""
         self.now = now
         self.counters.chars_received += len(data)
-        if now >= self._old_until and not self._is_old:
+        if now >= self._old_until:
             self.listener.hear(data, now)
 
     def handle_timeout(self, now: float) -> None:

@@ -323,12 +323,8 @@ class Machine:
             if self._background is not None:
                 self._background.ended(error)
 
-    def came(self, count: int, now: float, *, has_more: bool) -> None:
-        """
-        Take notice of a read from a connection, whose bytes come with ``receive_data``, in parts.
-
-        ``has_more`` tells that the read may have left bytes unread.
-        """
+    def came(self, count: int, now: float) -> None:
+        """Record a read from a connection, whose bytes come with ``receive_data``, in parts."""
 
     def receive_data(self, data: bytes, now: float) -> None:
         """Take bytes from the line."""

@@ -356,7 +356,7 @@ class LinkThread(threading.Thread):
                 # whether an answer in the buffer came in time.
                 machine.handle_timeout(now)
             if not left:  # a terminal keeps few bytes, and a pseudo-terminal has no speed
-                machine.came(0 if port.is_terminal else len(data), now, has_more=port.has_more)
+                machine.came(0 if port.is_terminal else len(data), now)
             if left or port.has_more:
                 left = self._take_portion(data, now)
                 continue
