@@ -144,12 +144,15 @@ class StandardPollingMaster:
         self._given.clear()
         self._unproven.clear()
         self._priority.started = self._normal.started = None  # no scan lasts across a stop
+        begun = self._machine.now
         while True:
-            begun = self._machine.now
             yield from self._scan(source)
+            if self._normal.position:
+                continue  # a group may hold only silent stations, or ourselves
             if self._machine.now == begun:  # no station can be polled now
                 yield from self._between_polls(source)
                 yield Rest(_PAUSE)
+            begun = self._machine.now
 
     def _is_active(self, number: int) -> bool:
         """Tell whether an entry of a list has its turn: our own number, or an active station."""
@@ -170,19 +173,17 @@ class StandardPollingMaster:
         normal = self._normal
         if normal.position == 0:
             normal.turn(self._machine.now)
-        room = self._polling.group_size or len(normal.stations)
-        # Inactive stations behind the group belong to it: a group of them alone would be a pause.
-        while normal.position < len(normal.stations):
+        group_size = self._polling.group_size or len(normal.stations)
+        visited = 0
+        while normal.position < len(normal.stations) and visited < group_size:
             number = normal.stations[normal.position]
-            is_active = self._is_active(number)
-            if is_active and not room:
-                return
             normal.position += 1
-            if is_active:
-                room -= 1
+            if self._is_active(number):
+                visited += 1
                 yield from self._visit(number, source)
-        normal.position = 0
-        yield from self._visit_inactive(normal, source)
+        if normal.position >= len(normal.stations):
+            normal.position = 0
+            yield from self._visit_inactive(normal, source)
 
     def _visit_inactive(self, polled: _PollList, source: TaskSource) -> Procedure:
         """Poll one inactive station of a list, if the share of probes allows."""
