@@ -26,7 +26,7 @@ from typing import Protocol
 
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.link import Link
-from abdf1_ros.df1.machine import Background, Listen, Machine, MOST_LATE, Procedure
+from abdf1_ros.df1.machine import Background, Listen, Machine, MOST_LATE, OLD, Procedure
 from abdf1_ros.df1.mode import LineMode
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.settings import LinkSettings
@@ -41,10 +41,6 @@ _LOOK = 0.1
 # If the line needs more than these seconds for the bytes of some reads, they have waited in a
 # buffer.
 _BUFFERED = 0.3
-
-# Seconds for which bytes are dropped after a pause of this process, or after bytes that have
-# waited. A network brings such bytes in pieces, with pauses between them.
-_OLD = 0.5
 
 
 class SecondPort(bytes):
@@ -73,7 +69,6 @@ class ListeningMachine(Machine):
     """
 
     listener: ByteListener
-    _old_until = -math.inf
     _line_until = -math.inf  # when the bytes of the last reads end on the line
 
     def came(self, count: int, now: float) -> None:
@@ -82,13 +77,14 @@ class ListeningMachine(Machine):
         if self._line_until > now + _BUFFERED:
             if now >= self._old_until:
                 self.listener.forget(now)
-            self._line_until, self._old_until = now, now + _OLD
+            # A network brings such bytes in pieces, with pauses between them.
+            self._line_until, self._old_until = now, now + OLD
 
     def receive_data(self, data: bytes, now: float) -> None:
         """Take bytes from the line."""
         self.now = now
         self.counters.chars_received += len(data)
-        if now >= self._old_until:
+        if not self.may_be_old:
             self.listener.hear(data, now)
 
     def handle_timeout(self, now: float) -> None:
@@ -96,7 +92,7 @@ class ListeningMachine(Machine):
         is_late = self.deadline is not None and now - self.deadline > MOST_LATE
         super().handle_timeout(now)
         if is_late:
-            self._old_until = now + _OLD
+            self._old_until = now + OLD
             self.listener.forget(now)
         self.listener.look(now)
 

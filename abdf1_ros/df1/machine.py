@@ -130,6 +130,15 @@ MIN_RESPONSE_TIME = 0.02
 # the bytes read next is then unknown.
 MOST_LATE = 0.2
 
+# After a longer pause of this process (s) the sender of a command may have given the command up.
+_PATIENCE_OF_SENDERS = 1.0
+
+# Longest rest (s) of a node that executes commands: without a deadline it would notice no pause.
+LONGEST_REST = 1.0
+
+# Seconds after a pause of this process in which bytes may still be old bytes of a buffer.
+OLD = 0.5
+
 # Longest time (s) that an operating system or a device server holds bytes of a frame back.
 HELD_BACK = 0.1
 
@@ -209,7 +218,8 @@ class Machine:
     ``procedure`` makes a new generator at every ``start``. With ``forget_on_send`` bytes that were
     heard before a transmission are dropped: for the master of a half-duplex line they cannot be
     the answer. ``counters`` gets the characters in both directions. ``background`` does its work
-    even while the line is busy.
+    even while the line is busy. After a pause of this process that is longer than
+    ``senders_patience`` (s), a message ``may_be_old``; infinite where ``serve`` judges its age.
 
     ``sender`` has the bytes to send. ``late`` is the sum of the seconds by which calls came more
     than MOST_LATE after a deadline of the procedure. In this time the process, or its host, did
@@ -219,7 +229,8 @@ class Machine:
     def __init__(self, procedure: Callable[[Machine], Procedure], *, checksum: Checksum,
                  duplex: Duplex = Duplex.HALF, timing: LineTiming | None = None,
                  counters: Counters | None = None, forget_on_send: bool = False,
-                 background: Background | None = None) -> None:
+                 background: Background | None = None,
+                 senders_patience: float = _PATIENCE_OF_SENDERS) -> None:
         self._checksum = checksum
         self.decoder = FrameDecoder(checksum, duplex)
         self.counters = counters or Counters()
@@ -229,6 +240,8 @@ class Machine:
         self.deadline: float | None = None
         self.late = 0.0
         self._last_pause = -math.inf, 0.0  # its end, and its seconds
+        self._old_until = -math.inf
+        self._senders_patience = senders_patience
         self._background = background
         self._make_procedure = procedure
         self._pause_limit = QUIET_CHARACTERS * self.timing.char_time + HELD_BACK  # inside a frame
@@ -256,6 +269,11 @@ class Machine:
     def echoes(self) -> bool:
         """Tell whether the line gives back what is sent."""
         return self.sender.echo.is_heard
+
+    @property
+    def may_be_old(self) -> bool:
+        """Tell whether a message may have waited while this process stood still."""
+        return self.now < self._old_until
 
     @property
     def message_begun(self) -> float:
@@ -390,6 +408,8 @@ class Machine:
         if (seconds := now - self.deadline) > MOST_LATE:
             self.late += seconds
             self._last_pause = now, seconds
+            if seconds > self._senders_patience:
+                self._old_until = now + OLD
         step = self._step
         if isinstance(step, Send) and not self._is_listening:  # its delay is over
             self._transmit(step)

@@ -54,7 +54,17 @@ from abdf1_ros.df1 import frames
 from abdf1_ros.df1.accounting import count_control, count_fault
 from abdf1_ros.df1.frames import Code, Control, Duplex, Frame, FrameFault, Symbol, Unknown
 from abdf1_ros.df1.link import ack_on_reply, EqualNode
-from abdf1_ros.df1.machine import Heard, Listen, Machine, Procedure, Rest, Send, Silence, Step
+from abdf1_ros.df1.machine import (
+    Heard,
+    Listen,
+    LONGEST_REST,
+    Machine,
+    Procedure,
+    Rest,
+    Send,
+    Silence,
+    Step,
+)
 from abdf1_ros.df1.mode import answer_time, LineMode
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.settings import LinkSettings
@@ -156,11 +166,11 @@ class FullDuplexPeer(EqualNode):
         return source.next_task(self._machine.now)
 
     def _idle_time(self, source: TaskSource) -> float:
-        """Return the seconds until a reply is overdue or a task is due; infinite for never."""
+        """Return the seconds until a reply is overdue or a task is due, at most LONGEST_REST."""
         moments = [self._given_up(entry) for entry in self._outstanding.values()]
         if len(self._outstanding) < self._settings.max_outstanding:
             moments.append(source.next_due())
-        return max(0.0, min(moments, default=math.inf) - self._machine.now)
+        return min(max(0.0, min(moments, default=math.inf) - self._machine.now), LONGEST_REST)
 
     def _send_command(self, task: Task) -> Procedure:
         number = task.command.dst
@@ -356,6 +366,9 @@ class FullDuplexPeer(EqualNode):
             self._counters.duplicate_messages += 1
             self._note(Message.NTC_DUPLICATE_MSG_RCVD, packet.src, station=packet.src)
             return self._respond(frames.ACK)
+        if not packet.is_reply and self._machine.may_be_old:
+            self._last_response = frames.NAK  # a sender that still waits sends it again
+            return b''
         if not packet.is_reply and len(self.replies) >= MAX_WAITING_REPLIES:
             self._counters.refused_for_memory += 1
             return self._respond(frames.NAK)  # sink full: not remembered, so it may come again

@@ -46,6 +46,7 @@ from abdf1_ros.df1.machine import (
     Heard,
     HELD_BACK,
     Listen,
+    LONGEST_REST,
     Machine,
     MIN_RESPONSE_TIME,
     MOMENT,
@@ -194,7 +195,7 @@ class RadioNode(EqualNode):
     def _rest(self, source: TaskSource) -> Step:
         """Return the step that waits until a command is overdue or a task is due."""
         if not self._under_way:
-            return Rest(max(source.next_due() - self._machine.now, 0.0))
+            return Rest(min(max(source.next_due() - self._machine.now, 0.0), LONGEST_REST))
         first = min(command.deadline for command in self._under_way.values())
         left = max(first - self._machine.now, 0.0)
         return Listen(min(left, _TICK) if self._has_room else left)
@@ -338,6 +339,8 @@ class RadioNode(EqualNode):
             if not self._may_be_forwarded(known, now):
                 known.answered = now
                 self._answer(known.reply)
+        elif self._machine.may_be_old:
+            return  # a sender that still waits repeats it
         elif self._is_full:
             self._counters.refused_for_memory += 1  # not executed: its sender repeats it
         else:

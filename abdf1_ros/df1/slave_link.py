@@ -26,6 +26,7 @@ from collections.abc import Callable
 import math
 
 from abdf1_ros.df1.accounting import Accounting
+from abdf1_ros.df1.frames import Frame
 from abdf1_ros.df1.link import Link, LinkState
 from abdf1_ros.df1.machine import Machine, Procedure, Rest, Silence
 from abdf1_ros.df1.mode import LineMode
@@ -75,7 +76,9 @@ class SlaveLink(Link, Initiator):
         while True:
             # Look at fixed times, not after a pause, because the line may never be quiet.
             symbol = yield Rest(max(0.0, next_look - self._machine.now))
-            if not isinstance(symbol, Silence):
+            # A master that still waits for an ACK repeats a message that may be old.
+            is_old = isinstance(symbol, Frame) and self._machine.may_be_old
+            if not isinstance(symbol, Silence) and not is_old:
                 try:
                     yield from answer(self._machine, symbol, self._slave.respond,
                                       lambda: self._look_after(source), self._expiry)

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+import math
 
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.machine import LineTiming, Machine, MOST_LATE, Procedure
@@ -74,7 +75,7 @@ class GuestLine:
         checksum = place.check or network.checksum
         char_time = self._port.char_time if place.kind == 'serial' else 0.0
         self.machine = Machine(self._run, checksum=checksum, duplex=Duplex.FULL,
-                               timing=LineTiming(char_time))
+                               timing=LineTiming(char_time), senders_patience=math.inf)
         self._peer = FullDuplexPeer(
             self.machine, LinkSettings(station=None, checksum=checksum), ActiveStationList(),
             self._take)

@@ -215,6 +215,17 @@ def test_reply_to_another_node_does_not_make_ours_a_repetition() -> None:
     assert peer.counts().get('duplicate_messages', 0) == 0
 
 
+def test_command_that_may_have_waited_while_this_process_stood_still_has_to_come_again() -> None:
+    for pause, served in ((1.0, [THEIRS]), (1.01, [])):  # its sender waits for 1 s at least
+        peer = bench()
+        peer.now = (peer.machine.next_call or 0.0) + pause
+        peer.machine.handle_timeout(peer.now)
+        assert (peer.hear(peer.frame(THEIRS)) == b'', peer.served) == (not served, served)
+    assert peer.hear(ENQ) == NAK
+    peer.wait(0.5)
+    assert (peer.hear_packet(THEIRS)[:2], peer.served) == (ACK, [THEIRS])
+
+
 def test_longest_message_is_served() -> None:
     peer = bench()
     command = THEIRS._replace(data=b'\x10' * (MAX_LINK_DATA - 6))

@@ -182,6 +182,15 @@ def test_sender_that_always_counts_zero_is_served_after_a_while() -> None:
         bench.wait(3.0)
 
 
+def test_command_that_may_have_waited_while_this_process_stood_still_has_to_come_again() -> None:
+    bench = Bench()
+    bench.now += 30.0
+    bench.machine.handle_timeout(bench.now)
+    for executed in (0, 1):
+        bench.hear(framed(THEIRS))
+        assert (len(bench.wait(0.5)), len(bench.executed)) == (executed, executed)
+
+
 def test_command_for_which_there_is_no_room_is_not_executed() -> None:
     bench = Bench()
     commands = [framed(THEIRS._replace(tns=tns)) for tns in range(18)]

@@ -184,6 +184,17 @@ def test_command_whose_ack_the_port_does_not_take_is_not_executed_later() -> Non
     assert (bench.poll(), bench.served) == (EOT, [])
 
 
+def test_command_that_may_have_waited_while_this_process_stood_still_has_to_come_again() -> None:
+    bench = SlaveBench(SETTINGS)
+    bench.now += 30.0
+    bench.machine.handle_timeout(bench.now)
+    for dst, station in ((US, US), (BROADCAST, BROADCAST)):
+        command = FROM_MASTER._replace(dst=dst)
+        assert (bench.hear(bench.frame(command, station)), bench.served) == (b'', [])
+    bench.wait(0.5)
+    assert (bench.hear(bench.frame(FROM_MASTER)), bench.served) == (ACK, [FROM_MASTER])
+
+
 def test_command_for_a_node_behind_us_is_refused_and_counted() -> None:
     bench = SlaveBench(SETTINGS)
     astray = FROM_MASTER._replace(dst=OTHER)
