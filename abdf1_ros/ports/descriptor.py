@@ -36,6 +36,7 @@ READ_SIZE = 512
 """Most bytes of one read. Fewer bytes arrive while the thread of a line sleeps."""
 
 WRITE_TIMEOUT = 2.0
+NO_DATA_TAKEN = 'the line takes no data; is Handshake right?'
 
 
 class NoClient(OSError):
@@ -154,7 +155,7 @@ class DescriptorPort:
                 poll.register(self._descriptor, select.POLLOUT)
                 left = give_up - time.monotonic()
                 if left <= 0:
-                    raise OSError('the line takes no data; is Handshake right?') from None
+                    raise OSError(NO_DATA_TAKEN) from None
                 poll.poll(math.ceil(left * 1000))
 
     def errors(self) -> dict[str, int]:

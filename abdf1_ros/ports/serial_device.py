@@ -33,7 +33,7 @@ from typing import TypeVar
 
 from abdf1_ros.df1.frames import Damaged
 from abdf1_ros.line_names import device_of, number_of
-from abdf1_ros.ports.descriptor import DescriptorPort
+from abdf1_ros.ports.descriptor import DescriptorPort, NO_DATA_TAKEN, WRITE_TIMEOUT
 from abdf1_ros.ports.ownership import BUSY, own
 from abdf1_ros.ports.settings import PortSettings
 import serial
@@ -170,6 +170,8 @@ class SerialDevice(DescriptorPort):
         self._origin = self._counts()
         self._settings = self._current_settings()
         self._next_look = 0.0
+        self._written = self._left = 0  # bytes; those that have left are counted at each look
+        self._left_at = time.monotonic()  # when bytes left last, or none waited
 
     def _current_settings(self) -> list[object]:
         try:
@@ -179,20 +181,28 @@ class SerialDevice(DescriptorPort):
 
     def look(self) -> float:
         """
-        Check the settings if a check is due; return the seconds until the next check.
+        Check the port if a check is due; return the seconds until the next check.
 
         Raises OSError if another program has changed the settings, so that we open the port again.
+        Raises OSError also if no byte leaves, as without CTS: ``close`` drops the bytes, so that
+        no command leaves long after it has ended.
         """
         now = time.monotonic()
         if now >= self._next_look:
             self._next_look = now + SETTINGS_LOOK
             if self._current_settings() not in ([], self._settings):
                 raise OSError('another program has changed the settings of the port')
+            unsent = self.unsent()
+            if not unsent or self._written - unsent != self._left:
+                self._left, self._left_at = self._written - unsent, now
+            elif now - self._left_at > WRITE_TIMEOUT + SETTINGS_LOOK:
+                raise OSError(NO_DATA_TAKEN)
         return self._next_look - now
 
     def write(self, data: bytes) -> None:
         self.look()
         super().write(data)
+        self._written += len(data)
 
     @property
     def has_pieces(self) -> bool:

@@ -23,6 +23,7 @@ from pathlib import Path
 import stat
 import struct
 import termios
+import time
 from types import SimpleNamespace
 from typing import Any
 
@@ -322,6 +323,23 @@ def test_settings_that_another_program_changes_are_a_lost_port(
     pty.close()
     with pytest.raises(OSError, match='Input/output error'):
         port.write(b'\x04')
+    port.close()
+
+
+def test_line_that_takes_no_byte_for_three_seconds_is_a_lost_port(
+        pty: Pty, monkeypatch: pytest.MonkeyPatch) -> None:
+    unsent, now, port = 0, time.monotonic(), open_port(PortSettings(str(pty.name)))
+    monkeypatch.setattr(serial_device, 'time', SimpleNamespace(
+        monotonic=lambda: now, sleep=time.sleep))
+    monkeypatch.setattr(SerialDevice, 'unsent', lambda _: unsent)
+    port.write(bytes(6))
+    for wait, left in ((1.1, 6), (1.1, 6), (1.0, 5), (2.9, 5)):  # at last one byte leaves
+        now, unsent = now + wait, left
+        port.look()  # type: ignore[attr-defined]
+    now += 1.0
+    with pytest.raises(OSError, match='the line takes no data; is Handshake right?'):
+        port.write(b'x')
+    unsent = 0
     port.close()
 
 
