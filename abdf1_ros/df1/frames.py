@@ -243,6 +243,11 @@ class FrameDecoder:
         self._is_damaged = False  # a character of the message that is coming in
         self._has_response = False
 
+    @property
+    def has_begun(self) -> bool:
+        """Tell whether a symbol has begun and not ended."""
+        return bool(self.waiting) or self._step != self._idle
+
     def reset(self) -> None:
         """Forget everything heard so far."""
         if self.waiting or self.in_message:

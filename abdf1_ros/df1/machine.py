@@ -221,6 +221,7 @@ class Machine:
     even while the line is busy. After a pause of this process that is longer than
     ``senders_patience`` (s), a message ``may_be_old``; infinite where ``serve`` judges its age.
 
+    ``is_behind`` is set while bytes have come that ``receive_data`` is still to be given.
     ``sender`` has the bytes to send. ``late`` is the sum of the seconds by which calls came more
     than MOST_LATE after a deadline of the procedure. In this time the process, or its host, did
     not run.
@@ -239,6 +240,7 @@ class Machine:
         self.now = 0.0
         self.deadline: float | None = None
         self.late = 0.0
+        self.is_behind = False
         self._last_pause = -math.inf, 0.0  # its end, and its seconds
         self._old_until = -math.inf
         self._senders_patience = senders_patience

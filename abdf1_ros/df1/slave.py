@@ -279,14 +279,16 @@ def answer(machine: Machine, symbol: Symbol, handle: Callable[[Symbol], bytes],
     late, CommandExpired is raised.
 
     A master that has sent another symbol does not wait for the old answer any more. It would
-    relate the old answer to the new symbol. So a poll or a message is ignored if another symbol
-    has come after it.
+    relate the old answer to the new symbol. So a poll or a message is ignored if another symbol,
+    or the beginning of one, has come after it.
     """
     heard: Symbol | None = symbol
     while heard is not None:
         symbol, heard = heard, None
         if _wants_answer(symbol):
             heard = yield from _next_within(machine, machine.timing.tx_delay, look)
+            if heard is None and (machine.is_behind or machine.decoder.has_begun):
+                return
         if heard is None and (data := handle(symbol)):
             # An answer with a time limit waits until the caller, who has the port, has checked the
             # limit.

@@ -357,6 +357,7 @@ class LinkThread(threading.Thread):
                 machine.handle_timeout(now)
             if not left:  # a terminal keeps few bytes, and a pseudo-terminal has no speed
                 machine.came(0 if port.is_terminal else len(data), now)
+            machine.is_behind = port.has_more or len(data) > _PORTION and bool(left)
             if left or port.has_more:
                 left = self._take_portion(data, now)
                 continue

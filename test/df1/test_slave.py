@@ -151,6 +151,16 @@ def test_command_whose_reply_has_come_is_not_sent_again() -> None:
     assert bench.poll() == EOT
 
 
+def test_poll_or_message_after_which_the_line_has_gone_on_is_not_answered() -> None:
+    bench = SlaveBench(SETTINGS)
+    for data in (poll_frame(US), bench.frame(FROM_MASTER)):
+        for count in (1, 3, 4):
+            assert bench.hear(data + bench.frame(FROM_MASTER, OTHER)[:count]) == b''
+            bench.machine.start(bench.now)
+        for bench.machine.is_behind, is_answered in ((True, False), (False, True)):
+            assert (bench.hear(data) != b'') is is_answered
+
+
 def test_message_that_just_stops_is_counted_once() -> None:
     bench = SlaveBench(SETTINGS)
     assert bench.hear(bench.frame(FROM_MASTER)[:9]) == b''

@@ -224,12 +224,14 @@ class Restful(Impatient):
                          processor_clock=lambda: port.worked, **options)
         self.rests: list[float] = []
         self.taken: list[int] = []
+        self.behind: list[bool] = []
         self._babbler = port
         self._late = iter(late)
         receive = script.machine.receive_data
 
         def take(data: bytes, now: float) -> None:
             self.taken.append(len(data))
+            self.behind.append(script.machine.is_behind)
             receive(data, now)
             port.worked += work
             port.now += work + host
@@ -253,6 +255,7 @@ def test_connection_that_babbles_leaves_time_to_others(
     thread.run_out()
     assert [call.args[0] for call in came.call_args_list] == [READ_SIZE] * 10
     assert thread.taken == [*[64] * 4 * 8, READ_SIZE, *[64] * 5 * 8]
+    assert [at for at, is_behind in enumerate(thread.behind) if not is_behind] == [4 * 8]
     del thread.rests[4 * 8]  # after the work of the read before it too
     assert thread.rests == [pytest.approx(rest)] * 71
 
