@@ -39,8 +39,9 @@ from abdf1_ros.messages import Event
 _LOOK = 0.1
 
 # If the line needs more than these seconds for the bytes of some reads, they have waited in a
-# buffer.
+# buffer. But a device server may send a whole message at once: it has at most these characters.
 _BUFFERED = 0.3
+_LONGEST_MESSAGE = 300
 
 
 class SecondPort(bytes):
@@ -74,7 +75,7 @@ class ListeningMachine(Machine):
     def came(self, count: int, now: float) -> None:
         """Judge whether the bytes of a read are old."""
         self._line_until = max(self._line_until, now) + count * self.timing.char_time
-        if self._line_until > now + _BUFFERED:
+        if self._line_until > now + max(_BUFFERED, _LONGEST_MESSAGE * self.timing.char_time):
             if now >= self._old_until:
                 self.listener.forget(now)
             # A network brings such bytes in pieces, with pauses between them.

@@ -351,8 +351,8 @@ def test_what_lay_in_a_buffer_while_the_process_stood_still_is_dropped() -> None
 def test_what_comes_faster_than_the_line_brings_it_is_old_until_half_a_second_without() -> None:
     bench, mapping = listening()  # 9600 baud: 512 bytes in 0.53 s
     for tns, (pause, count, heard) in enumerate((
-            (0.0, 40, 1), (0.1, 512, 1), (0.02, 512, 1), (0.4, 300, 1), (0.4, 150, 1),
-            (0.2, 40, 2))):
+            (0.0, 40, 1), (1.0, 300, 2), (1.0, 512, 2), (0.02, 512, 2), (0.4, 310, 2),
+            (0.4, 150, 2), (0.2, 40, 3))):
         bench.run(pause)
         bench.machine.came(count, bench.now)
         bench.hear(frame(command(tns, READ_N7_0), 1) + frame(reply(tns, VALUES)))
