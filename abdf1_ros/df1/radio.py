@@ -73,6 +73,9 @@ _RECENT = 10.0
 # Most packets of ours that are remembered: nodes may forward them back to us.
 _MOST_SENT = 256
 
+# Most commands of one node that are remembered: a copy may be forwarded after many newer ones.
+_MOST_EXECUTED = 256
+
 # Most replies and forwarded packets that wait for a quiet line. Further packets are dropped.
 _MOST_WAITING = 16
 
@@ -151,10 +154,11 @@ class RadioNode(EqualNode):
         return LinkState(same_number=self._same_number)
 
     def _forget(self) -> None:
-        self._waiting: deque[bytes] = deque()  # link data to be sent
+        # Link data to be sent, and until when (clock value in s).
+        self._waiting: deque[tuple[bytes, float]] = deque()
         self._heard: deque[tuple[bytes, float]] = deque(maxlen=_MOST_HEARD)  # and when heard
         self._executed: defaultdict[int, deque[_Executed]] = defaultdict(
-            lambda: deque(maxlen=MOST_UNDER_WAY))  # by SRC
+            lambda: deque(maxlen=_MOST_EXECUTED))  # by SRC
         self._under_way: dict[int, _SentCommand] = {}  # by station
         self._sent: deque[bytes] = deque(maxlen=_MOST_SENT)
         self._begun = self._machine.now
@@ -174,7 +178,8 @@ class RadioNode(EqualNode):
             # Packets, repetitions and new commands take turns, so that none of them waits for
             # ever.
             if self._waiting:
-                yield from self._send(self._waiting.popleft())
+                data, until = self._waiting.popleft()
+                yield from self._send(data, until=until)
             if (command := self._overdue()) is not None:
                 yield from self._try(command)
             task = self._has_room and source.next_task(self._machine.now, self._under_way)
@@ -238,11 +243,14 @@ class RadioNode(EqualNode):
         command.tries += 1
         command.deadline = self._machine.sender.free_at + self._settings.cmd_timeout
 
-    def _send(self, data: bytes, command: _SentCommand | None = None) -> Procedure:
-        """Send link data when the line is quiet, unless their command has ended by then."""
+    def _send(self, data: bytes, command: _SentCommand | None = None,
+              until: float = math.inf) -> Procedure:
+        """Send link data when the line is quiet, unless it is too late for them by then."""
         frame = frames.message_frame(data, self._settings.checksum)
         yield from self._wait_for_quiet(len(frame), command)
         expires = math.inf
+        if self._machine.now > until:
+            return
         if command is not None:
             if self._is_over(command):
                 return
@@ -308,8 +316,10 @@ class RadioNode(EqualNode):
         is_ours = packet.dst in self._numbers
         is_known = self._note_heard(symbol.data)
         between = {packet.src, packet.dst}
-        if not is_known and not is_ours and between <= {*self._settings.store_forward}:
-            self._put(symbol.data)
+        is_new = not is_known and not self._machine.may_be_old
+        if is_new and not is_ours and between <= {*self._settings.store_forward}:
+            # Later, its sender has repeated it or has sent newer ones.
+            self._put(symbol.data, self._machine.now + self._settings.cmd_timeout)
         if not is_ours and packet.dst != BROADCAST:
             return
         self._counters.messages_received += 1
@@ -380,12 +390,12 @@ class RadioNode(EqualNode):
     def _is_full(self) -> bool:
         return len(self._waiting) >= _MOST_WAITING
 
-    def _put(self, data: bytes) -> None:
-        """Add link data to the queue for the line, if there is room."""
+    def _put(self, data: bytes, until: float = math.inf) -> None:
+        """Add link data to the queue for the line, to be sent ``until`` then, if there is room."""
         if self._is_full:
             self._counters.refused_for_memory += 1
         else:
-            self._waiting.append(data)
+            self._waiting.append((data, until))
 
     def _take_reply(self, packet: Packet, *, is_repetition: bool) -> None:
         """Give a reply to the command that waits for it."""

@@ -161,10 +161,12 @@ def test_command_that_has_become_too_old_is_not_repeated() -> None:
 def test_repetition_is_known_whatever_many_others_have_sent_since() -> None:
     bench = Bench()
     bench.hear(framed(THEIRS))
-    bench.wait(1.0)
-    bench.hear(*(framed(THEIRS._replace(src=3, tns=tns)) for tns in range(30)))
+    for src in (PLC, 3):
+        bench.wait(3.0)
+        bench.hear(*(framed(THEIRS._replace(src=src, tns=tns)) for tns in range(30)))
+    bench.wait(3.0)
     bench.hear(framed(THEIRS))
-    assert bench.executed[PLC, THEIRS.tns] == 1
+    assert (bench.executed[PLC, THEIRS.tns], len(bench.executed)) == (1, 35)
 
 
 def test_sender_that_always_counts_zero_is_served_after_a_while() -> None:
@@ -219,6 +221,22 @@ def test_line_that_is_not_quiet_is_waited_for_but_not_for_ever() -> None:
             break
         bench.hear(b'\x55' * 20)
     assert 2.0 <= bench.now - 100.0 <= 2.2
+
+
+def test_packet_is_sent_on_within_cmd_timeout_or_not_at_all() -> None:
+    other = THEIRS._replace(dst=OTHER)
+    for busy, said in ((0.9, [framed(other)]), (1.1, [])):
+        bench = Bench(store_forward={PLC, OTHER})
+        bench.hear(framed(other))
+        end = bench.now + busy
+        while bench.now < end - 0.1:
+            bench.hear(b'\x55' * 20)
+            assert bench.wait(0.03) == []
+        assert bench.wait(3.0) == said
+    bench.now += 30.0  # this process stands still
+    bench.machine.handle_timeout(bench.now)
+    bench.hear(framed(other._replace(tns=9)))
+    assert bench.wait(3.0) == []
 
 
 @pytest.mark.parametrize('entry', [
