@@ -40,7 +40,7 @@ from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.ports.endpoints import PtyEndpoint
 from abdf1_ros.ports.link_thread import LinkThread
-from abdf1_ros.problems import ConfigurationError
+from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.ros import observer
 from abdf1_ros.ros.topics.messages import latched_qos
 from abdf1_ros.ros.untyped import RosMessage
@@ -251,6 +251,7 @@ class Plcs:
         for word in words:
             if not -0x8000 <= word <= 0xFFFF:
                 raise ValueError(f'{word} is not a word, from -32768 to 65535')
+        self[station].advance()
         table = self[station].table
         with self[station].lock:
             table.write(parse_address(address, table.plc_type),
@@ -276,8 +277,13 @@ class SimulatedCell:
         for name, text in (('data', data), ('map', rows), ('net', net)):
             (folder / f'{name}.csv').write_text(text, encoding='utf-8')
         net_file, map_file = str(folder / 'net.csv'), str(folder / 'map.csv')
-        if problems := examine(net_file, map_file).problems:
-            raise ConfigurationError(problems)
+        found = examine(net_file, map_file)
+        line = found.network
+        if line and not (line.line_mode.is_master and line.checksum is Checksum.CRC):
+            found.problems.append(Problem(
+                net_file, 'the simulated PLCs answer only Mode Master with Error_Code CRC'))
+        if found.problems:
+            raise ConfigurationError(found.problems)
         self.plcs = Plcs(folder / 'data.csv', ladders)
         self.assignments = [f'net_file:={net_file}', f'map_file:={map_file}',
                             f'port:={self.plcs.port}', *parameters]

@@ -106,6 +106,8 @@ def test_what_can_never_come_is_told_at_once(abdf1_cell: Cells) -> None:  # noqa
     rows = 'Tag,Command,Address,Station,PLC_Type\npressure,Read,N7:{},1,SLC\n'
     with pytest.raises(ConfigurationError, match='map.csv:2:3'):
         abdf1_cell(data, rows.format('x'))
+    with pytest.raises(ConfigurationError, match='net.csv: .* only Mode Master with Error'):
+        abdf1_cell(data, rows.format(0), 'Mode\nPeer\n')
     with pytest.raises(LookupError, match='there is no station 3'):
         abdf1_cell(data, rows.format(0), ladders=[3])
     cell = abdf1_cell(data, rows.format(0), parameters=['net.baud:=7'])

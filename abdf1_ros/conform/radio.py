@@ -63,6 +63,7 @@ def reply_alone(end: RadioEnd) -> None:
 def symbols_ignored(end: RadioEnd) -> None:
     end.ask(0x06, b'\x00')
     for symbol in (codec.NAK, codec.ENQ, codec.ACK, codec.EOT):
+        end.wire.forget_reply()
         end.wire.send(symbol)
         end.wire.expect_silence('symbols mean nothing here')
     end.ask(0x06, b'\x00')

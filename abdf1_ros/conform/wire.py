@@ -177,6 +177,10 @@ class Wire:
             self._response = raw
         self._line.write(raw)
 
+    def forget_reply(self) -> None:
+        """Take the last reply by radio, if it comes again, for an answer: nobody forwards it."""
+        self._last_reply = b''
+
     def hear(self, within: float | None = None, *, answers: bool = True) -> Symbol | None:
         """
         Return the next symbol; None if no symbol begins within ``within`` s.

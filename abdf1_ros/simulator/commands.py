@@ -64,6 +64,7 @@ def _ladder(plc: SimulatedPlc) -> Ladder:
     if plc.ladder is None:
         raise CommandError(f'station {plc.station} has no ladder; start with --ladder '
                            f'{plc.station}')
+    plc.advance()
     return plc.ladder
 
 

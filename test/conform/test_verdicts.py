@@ -171,6 +171,7 @@ FAULTS = [(target, habit, name) for targets, habit, name in [
     ((Target.CLIENT,), Habit.ENQUIRES_ALWAYS, 'no-needless-enquiry'),
     (RADIO, Habit.ACKNOWLEDGES, 'reply-alone'), (RADIO, Habit.ENQUIRES_ALWAYS, 'reply-alone'),
     (RADIO, Habit.ANSWERS_SYMBOLS, 'symbols-ignored'),
+    (RADIO, Habit.REPEATS_AFTER_NAK, 'symbols-ignored'),
     (RADIO, Habit.TAKES_BAD_CHECK, 'bad-check-ignored'),
     (RADIO, Habit.NAKS_BAD_CHECK, 'bad-check-ignored'),
     (RADIO, Habit.TAKES_SHORT, 'short-message-ignored'),

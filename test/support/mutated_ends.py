@@ -102,7 +102,7 @@ Habit = Enum('Habit', [
     'NAK_BEFORE_COMMAND', 'TAKES_ANY_TNS', 'TAKES_ANY_DESTINATION', 'REPEATS_FOR_EVER',
     'STOPS_AFTER_10',  # commands
     # Of a radio modem node or client.
-    'ACKNOWLEDGES', 'ANSWERS_SYMBOLS', 'REPLIES_FOR_OTHERS',
+    'ACKNOWLEDGES', 'ANSWERS_SYMBOLS', 'REPEATS_AFTER_NAK', 'REPLIES_FOR_OTHERS',
     'EXECUTES_FOR_OTHERS',  # in silence
     'REPEATS_REPLY', 'SENDS_ON', 'SENDS_ON_OWN',
     'SENDS_ON_AGAIN',  # whenever it is heard
@@ -761,6 +761,11 @@ class _Radio(Wire):
     def __init__(self, check: str, habits: frozenset[Habit]) -> None:
         super().__init__(check, habits, is_half_duplex=False)
         self._sent_on: set[bytes] = set()
+        self._last = b''
+
+    def say(self, data: bytes, delay: float = 0.0) -> None:
+        self._last = data
+        super().say(data, delay)
 
     def taken(self, data: bytes, is_ours: bool) -> None:
         """Take a good message."""
@@ -774,6 +779,8 @@ class _Radio(Wire):
         if symbol[0] != 'message':
             if self.has(Habit.ANSWERS_SYMBOLS) and symbol == (_ENQ,):
                 self.say(bytes((_DLE, _NAK)))
+            if self.has(Habit.REPEATS_AFTER_NAK) and symbol == (_NAK,):
+                self.say(self._last)
             return
         data, is_good = symbol[2], symbol[3]
         assert isinstance(data, bytes)
