@@ -123,6 +123,7 @@ class PtyEndpoint:
         if self._link and _target_of(self._link) == self._target:
             self._link.unlink()
         _close(self._ends)
+        self._ends.clear()  # by the next ``close`` the numbers may belong to others
         if self._lock is not None:
             self._lock.close()
 
