@@ -89,7 +89,7 @@ def refused(capsys: Output, *args: str) -> str:
 
 def test_capture_is_shown_line_by_line_with_a_summary(capsys: Output, capture: str) -> None:
     lines = lines_of(capsys, capture)
-    assert lines[:5] == LINES
+    assert lines[:5] == LINES and lines_of(capsys, '--check', 'crc', capture) == lines
     assert lines[5].startswith('summary: 0.0 s, 45 bytes (27 >, 18 <), half duplex, CRC')
     assert lines[6] == '  seen: 1 command, 1 reply, 1 poll, 2 ACK'
     assert lines[7] == '  faults: none'
@@ -131,14 +131,14 @@ def test_capture_with_other_settings_is_of_another_line(capsys: Output, tmp_path
         _, _, lines = (VECTOR_FOLDER / 'captures' / f'libplctag_client_crc_plc5{name}.cap'
                        ).read_text('ascii').partition('\n')
         paths.append(tmp_path / duplex)
-        paths[-1].write_text(f'# abdf1_ros capture 1\n# baud: {baud}\n# check: CRC\n'
-                             f'# duplex: {duplex}\n{lines}', 'ascii')
+        paths[-1].write_text(f'# abdf1_ros capture 1\n# baud: {baud}\n# duplex: {duplex}\n{lines}'
+                             f'999.0 > 10 02 31\n', 'ascii')  # broken off
     for files in (paths, paths[::-1]):
         assert main(['--summary', *map(str, files)]) == 0
         head, seen, faults, *_ = capsys.readouterr().out.splitlines()
         assert seen == ('  seen: 148 commands, 148 replies, 66 of them with an error, 48 polls, '
                         '295 ACK')
-        assert (faults, 'load' in head) == ('  faults: none', False)  # it has two speeds
+        assert (faults, 'load' in head) == ('  faults: 2 damaged', False)  # it has two speeds
 
 
 def test_options_and_bytes_win_over_the_head_of_a_capture(capsys: Output, capture: str) -> None:
@@ -179,6 +179,7 @@ def test_endless_file_does_not_fill_the_memory(
 
 def test_progress_has_a_percentage_where_the_size_is_known(
         capsys: Output, capture: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys.stdout, 'isatty', lambda: True)
     for period, is_terminal, count in ((9.0, True, 0), (0.0, False, 0), (0.0, True, 5)):
         monkeypatch.setattr(sniff, 'PROGRESS_PERIOD', period)
         monkeypatch.setattr(sys.stderr, 'isatty', lambda: is_terminal)  # noqa: B023
@@ -186,7 +187,8 @@ def test_progress_has_a_percentage_where_the_size_is_known(
         told = capsys.readouterr().err.splitlines()
         assert len(told) == count
     assert told[-1] == f'sniff: {capture}: 100 %, 45 bytes so far'
-    output = sniff.Output(sniff.parse(['--summary', capture]))
+    monkeypatch.setattr(sys.stdout, 'isatty', lambda: False)
+    output = sniff.Output(sniff.parse([capture]))
     monkeypatch.setattr(sniff, 'PROGRESS_PERIOD', 9.0)
     for done in 'ab':
         output.show_progress(done)
@@ -214,14 +216,26 @@ def test_file_without_bytes_is_told(
         capsys: Output, tmp_path: Path, capture: str, text: str) -> None:
     path = tmp_path / 'empty'
     path.write_text(text, encoding='ascii')
-    assert main([capture, str(path)]) == 0
-    assert capsys.readouterr().err == f'sniff: {path}: the file has no bytes\n'
+    assert main([str(path), capture]) == 0
+    captured = capsys.readouterr()
+    assert captured.err == f'sniff: {path}: the file has no bytes\n'
+    assert captured.out.splitlines()[:5] == LINES
 
 
 def test_end_of_the_time_is_no_empty_file(capsys: Output, capture: str) -> None:
     assert main(['--seconds', '1e-9', capture, capture]) == 0
     captured = capsys.readouterr()
     assert (captured.out.splitlines()[0], captured.err) == ('summary: 0 bytes', '')
+
+
+def test_ctrl_c_shows_what_was_read_so_far(
+        capsys: Output, monkeypatch: pytest.MonkeyPatch) -> None:
+    def chunks() -> Iterator[Chunk]:
+        yield Chunk(0.5, Direction.OUT, SAID[0][:-1])
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(sniff, 'Recording', Mock(return_value=Mock(chunks=chunks, settings={})))
+    assert lines_of(capsys, 'x')[1].startswith('summary: ')
 
 
 @pytest.mark.parametrize('baud', ['9' * 5000, '-9600', '\\u0661', '0', 'fast'])
@@ -250,7 +264,8 @@ def test_packets_go_nowhere_else_than_into_pcapng(capsys: Output, capture: str) 
         capsys, '--pcapng', str(Path(capture).parent), capture)
     with no_file_longer_than(200):
         assert main(['--pcapng', f'{capture}.pcapng', capture]) == 2
-    assert 'File too large; no more packets are written\n' in capsys.readouterr().err
+    assert capsys.readouterr().err == (
+        f'sniff: {capture}.pcapng: File too large; no more packets are written\n')
     with open(capture, 'a', encoding='ascii') as file:
         file.write('0.05 > 10 02 31\n')  # broken off: it is told at the end
     whole = f'{capture}.whole'
@@ -265,6 +280,7 @@ def test_packets_go_nowhere_else_than_into_pcapng(capsys: Output, capture: str) 
     [], ['x', '--port', 'y'], ['--port', 'x', '--tap', 'y', 'z'], ['x', '--save', 'y'],
     ['--port', 'x', '--binary'], ['--tap', 'x'], ['--tap', 'x', 'x'],
     ['--port', 'x', '--save', 'y', '--html', './y'],
+    ['x', '--report', 'r', '--conformance', 'y', '--html', 'y'],
     ['x', '--check', 'md5'], ['x', '--baud', '7'], ['x', '--conformance', 'y'],
     ['x', '--seconds', 'many'], ['x', '--seconds', '1_0'], ['x', '--baud', '9_600']])
 def test_option_that_is_wrong_is_told_with_status_2(capsys: Output, args: list[str]) -> None:
@@ -372,7 +388,7 @@ def test_signal_ends_it_while_its_output_is_not_taken(
 def test_lost_port_ends_with_the_summary(tmp_path: Path) -> None:
     pty = Pty(tmp_path / 'line')
     saved = tmp_path / 'saved'
-    with Process('sniff', '--port', str(pty.name), '--save', str(saved)) as sniff:
+    with Process('sniff', '--port', str(pty.name), '--save', str(saved), '--html', '/x/y') as sniff:
         sniff.wait_for('sniff: ')
         pty.write(SAID[1])
         sniff.wait_for('? ')
@@ -385,8 +401,8 @@ def test_lost_port_ends_with_the_summary(tmp_path: Path) -> None:
 
 def test_what_a_slow_output_has_lost_is_told_and_saved(
         tmp_path: Path, capsys: Output, monkeypatch: pytest.MonkeyPatch) -> None:
-    tap = MagicMock(names=['x'], new_losses=Mock(side_effect=[1, 3]), chunks=lambda *args: iter(
-        Chunk(time, Direction.UNKNOWN, frames.poll_frame(2)) for time in (0.0, 0.1)))
+    tap = MagicMock(names=['x'], new_losses=Mock(side_effect=[1, 0, 3]), chunks=lambda *args: iter(
+        Chunk(time, Direction.UNKNOWN, frames.poll_frame(2)) for time in (0.0, 0.1, 0.2)))
     monkeypatch.setattr(sniff, 'Tap', made := Mock(return_value=tap))
     assert main(['--tap', 'x', 'pty', '--parity', 'Even', '--save', str(tmp_path / 'saved')]) == 0
     first, told = (f'{lost} of traffic lost: this output was too slow\n'
@@ -394,7 +410,9 @@ def test_what_a_slow_output_has_lost_is_told_and_saved(
     assert capsys.readouterr().err.endswith(f'sniff: {first}sniff: {told}')
     assert (tmp_path / 'saved').read_text('ascii').endswith(told)
     assert main([str(tmp_path / 'saved')]) == 0
-    assert f'lost lines before 0.1 s: {first[:-1]}. Faults' in capsys.readouterr().err
+    assert capsys.readouterr().err == (
+        f'sniff: {tmp_path}/saved: the recorder has lost lines before 0.1 s: {first[:-1]}. Faults '
+        'of the line there may be no faults\n')
     assert made.call_args.args[1].parity == 'Even'
     assert '# baud: 9600\n' in (tmp_path / 'saved').read_text('ascii')
     tap.new_losses = Mock(return_value=0)
@@ -407,7 +425,7 @@ def test_what_a_slow_output_has_lost_is_told_and_saved(
     monkeypatch.setattr(sys.stderr, 'isatty', lambda: True)
     capsys.readouterr()
     assert main(['--port', 'x', '--summary']) == 0  # also while the line is never idle
-    assert re.findall('listening, ([0-9]+) bytes', capsys.readouterr().err) == ['4', '8']
+    assert re.findall('listening, ([0-9]+) bytes', capsys.readouterr().err) == ['4', '8', '12']
 
 
 def test_colour_is_for_terminals_only(
@@ -476,12 +494,15 @@ def test_reader_that_leaves_does_not_cut_a_tap(
     assert b''.join(chunk.data for chunk in chunks) == (1 + 2 * goes_on) * (SAID[0] + SAID[1])
 
 
-def test_page_is_whole_though_nobody_reads_the_output(tmp_path: Path, capture: str) -> None:
-    page = tmp_path / 'line.html'
-    sniff = Forked('sniff', ['--html', str(page), capture])
-    sniff.stdout.close()
-    assert sniff.wait(PATIENCE) == 0
-    assert '</html>' in page.read_text('utf-8')
+def test_files_are_whole_though_nobody_reads_the_output(tmp_path: Path, capture: str) -> None:
+    page, packets = str(tmp_path / 'line.html'), str(tmp_path / 'packets')
+    for option, path, status in (('--html', page, 0), ('--pcapng', packets, 0),
+                                 ('--pcapng', '/dev/full', 2)):
+        sniff = Forked('sniff', [option, path, *[capture] * 99])
+        sniff.stdout.close()
+        assert sniff.wait(PATIENCE) == status
+    assert '</html>' in Path(page).read_text('utf-8')
+    assert len([*PacketFile(packets, BytesIO(Path(packets).read_bytes())).packets()]) == 5 * 99
 
 
 @pytest.mark.parametrize('args, text', [

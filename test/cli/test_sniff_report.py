@@ -174,11 +174,12 @@ def test_processor_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str],
                             monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / 'status.cap'
     lines = ['# abdf1_ros capture 1', '# check: CRC', '# duplex: full']
-    said = [*pair('diag_status_slc504')]
-    said.append(said[0]._replace(dst=9, tns=said[0].tns + 1))
-    said.append(said[2].reply(b'')._replace(sts=0x10))
-    said.append(said[0]._replace(tns=said[0].tns + 2))
-    said.append(said[4].reply(b'')._replace(sts=0x10))
+    asked, told = pair('diag_status_slc504')
+    halted = told.data[:18] + b'\x5E\x20' + told.data[20:]
+    said = [asked._replace(dst=4), told._replace(src=4, data=halted), asked, told]
+    for number, station in enumerate((9, told.src), 1):  # they refuse the question
+        said.append(asked._replace(dst=station, tns=asked.tns + number))
+        said.append(said[-1].reply(b'')._replace(sts=0x10))
     lines += [f'{count}.0 {"><"[count % 2]} '
               f'{frames.message_frame(packet.encode(), Checksum.CRC).hex()}'
               for count, packet in enumerate(said)]
@@ -186,8 +187,10 @@ def test_processor_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str],
     report = tmp_path / 'report.zip'
     assert main([str(path), '--summary', '--report', str(report)]) == 0
     text = unpacked(report)['processors.txt']
-    assert text.startswith(f'station {said[1].src}: SLC 5/04 series B revision 3, RUN; status ')
-    assert 'station 9' not in text  # it has refused the question
+    assert [line.partition('status ')[0] for line in text.splitlines()] == [
+        'station 1: SLC 5/04 series B revision 3, RUN; ',
+        'station 4: SLC 5/04 series B revision 3, RUN; major error 0x0000, processor halted; '
+        'forces installed; ']
     assert main([str(path), '--summary', '--report', str(report), '--anonymous']) == 0
     assert 'status ' not in unpacked(report)['processors.txt']
     monkeypatch.setattr(sniff_report, 'MOST_ENTRIES', 1)
