@@ -18,18 +18,22 @@ from importlib import import_module
 from io import BytesIO, TextIOWrapper
 import os
 from pathlib import Path
+import shlex
+import shutil
 import signal
 import subprocess
 import sys
 import sysconfig
 from types import SimpleNamespace
 from typing import NoReturn
+from zipfile import ZipFile
 
 from abdf1_ros.cli import main as commands
 from abdf1_ros.cli import terminal
 from abdf1_ros.cli.main import COMMANDS
 import pytest
 from support.cases import long_unless
+from support.commands import call, Output
 from support.ptys import PATIENCE
 
 # Each with a module that it imports, and its status when it is interrupted.
@@ -210,3 +214,24 @@ def test_first_word_that_is_no_command(given: list[str], status: int, told: str)
     said = subprocess.run([sys.executable, '-m', 'abdf1_ros', *given], text=True, timeout=60,
                           capture_output=True, check=False)
     assert (said.returncode, told in said.stdout + said.stderr) == (status, True)
+
+
+@pytest.mark.parametrize('name', ['check', 'sniff'])
+def test_all_that_commands_tell_is_as_stored(
+        name: str, tmp_path: Path, capsys: Output, monkeypatch: pytest.MonkeyPatch) -> None:
+    """After a change that is wanted, run it with UPDATE_STORED=1 and look at the difference."""
+    stored = Path(__file__).with_name('stored')
+    monkeypatch.chdir(shutil.copytree(stored, tmp_path / 'copy') / name)
+    told = ''
+    for line in Path('commands.txt').read_text('utf-8').splitlines():
+        command, *args = shlex.split(line)
+        said = call(import_module(COMMANDS[command][0]).main, capsys, *args)
+        told += f'$ {line}\n{said.out}{said.err}exit status {said.status}\n'
+    told += ''.join(f'{page}:\n{page.read_text("utf-8")}' for page in sorted(Path().glob('*.html')))
+    for path in sorted(Path().glob('*.zip')):
+        with ZipFile(path) as bundle:
+            told += ''.join(f'{name}:\n{bundle.read(name).decode()}' for name in bundle.namelist()
+                            if name.endswith('.txt'))
+    if 'UPDATE_STORED' in os.environ:
+        (stored / name / 'told.txt').write_text(told, 'utf-8')
+    assert told == (stored / name / 'told.txt').read_text('utf-8')
