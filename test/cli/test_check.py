@@ -21,6 +21,7 @@ import re
 import shlex
 import subprocess
 import sys
+from unittest.mock import Mock
 
 from abdf1_ros.cli.check import main
 from abdf1_ros.paths import config_file
@@ -272,7 +273,8 @@ def test_time_that_is_no_number_of_ms_is_told(option: str, text: str, capsys: Ou
     assert f'"{text}" should be ms from 0 to 86400000' in capsys.readouterr().err
 
 
-def test_output_that_cannot_take_it_is_no_traceback(files: Paths) -> None:
+def test_output_that_cannot_take_it_is_no_traceback(
+        files: Paths, monkeypatch: pytest.MonkeyPatch) -> None:
     write_csv(files[0], NET_HEADER, ['5,Master,9600,500'])
     write_csv(files[1], MAP_HEADER, [GOOD_ROW])
     command = shlex.join([sys.executable, '-m', 'abdf1_ros', 'check', *map(str, files)])
@@ -286,6 +288,8 @@ def test_output_that_cannot_take_it_is_no_traceback(files: Paths) -> None:
     left = subprocess.run(['bash', '-c', f'{command} | true; exit ${{PIPESTATUS[0]}}'], text=True,
                           capture_output=True, timeout=30, check=False)
     assert (left.returncode, left.stderr) == (2, '')  # the files are bad, also without a reader
+    monkeypatch.setattr('builtins.print', Mock(side_effect=KeyboardInterrupt))
+    assert main([*map(str, files)]) == 130
 
 
 # A folder
