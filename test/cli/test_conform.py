@@ -97,9 +97,10 @@ def test_failures_skips_noise_and_early_enquiries_are_told(
     def results(cases: Sequence[Case], wire: Wire, end: object,
                 allowed: frozenset[Permission]) -> Iterator[CaseResult]:
         assert allowed == permissions
-        wire.noise, wire.enquired_after, wire.has_heard = 3, 0.78, True
+        wire.noise, wire.enquired_after, wire.has_heard = 3, 1.78, True
         yield CaseResult(cases[0], Verdict.FAIL, 0.1, 'ACK', 'NAK', ('we   10 05',))
         yield CaseResult(cases[0], Verdict.SKIP, got='needs a word')
+        yield CaseResult(cases[0], Verdict.PASS)
 
     monkeypatch.setattr('abdf1_ros.cli.conform.run_cases', results)
     permissions = {*Permission}
@@ -112,7 +113,7 @@ def test_failures_skips_noise_and_early_enquiries_are_told(
         said = capsys.readouterr()
         assert all(text in said.out for text in told)
         assert 'conform: 3 bytes outside of any symbol were' in said.err
-        assert '--answer-time 1 that may look like a fault: try --answer-time 0.3\n' in said.err
+        assert '--answer-time 1 that may look like a fault: try --answer-time 0.8\n' in said.err
 
 
 def test_damaged_character_is_not_an_answer(
@@ -120,8 +121,19 @@ def test_damaged_character_is_not_an_answer(
     said = cycle([b'\x10', Damaged(b'\x04')])
     monkeypatch.setattr('abdf1_ros.cli.conform.open_port', lambda settings: Mock(
         read=lambda *wait: next(said)))
-    assert main(['slave', '--port=/dev/ttyS0', '--only=poll-idle', '--answer-time=0.01']) == 1
-    assert 'FAIL  poll-idle' in capsys.readouterr().out
+    options = ['slave', '--port=socket://joe:4001', '--only=poll-idle', '--answer-time=0.01']
+    assert main([*options, '--report']) == 1
+    out = capsys.readouterr().out
+    assert '| FAIL | poll-idle |' in out and '- port: socket\n' in out
+
+
+def test_echo_that_comes_byte_by_byte_is_not_an_answer(
+        capsys: Output, monkeypatch: pytest.MonkeyPatch) -> None:
+    sent = bytearray()
+    monkeypatch.setattr('abdf1_ros.cli.conform.open_port', lambda settings: Mock(
+        write=sent.extend, read=lambda *wait: bytes([sent.pop(0)]) if sent else b''))
+    assert main(['slave', '--port=/x', '--only=poll-idle', '--answer-time=0.01', '--echo']) == 1
+    assert 'no byte was received' in capsys.readouterr().err
 
 
 def test_processor_of_another_family_is_not_read(tmp_path: Path, capsys: Output) -> None:
@@ -204,6 +216,7 @@ def test_program_that_reads_is_answered_as_a_plc_answers(
 
 @pytest.mark.parametrize(('args', 'status', 'text'), [
     (['slave', '--port', '/nowhere/at/all'], 1, '/nowhere/at/all: No such file'),
+    (['peer', '--port', '/no/where', '--own-station', '1'], 1, '/no/where: No such file'),
     (['slave'], 2, '--port'), (['master', '--pty', '/proc/stat'], 1, '/proc/stat'),
     (['master', '--tcp', '127.0.0.1:0', '--data', '/none'], 2, '/none: cannot be read'),
     (['radio', '--port', '/', '--own-station', '1'], 2, '1 is our own Station'),
@@ -228,6 +241,10 @@ def test_usage_is_shown_for_impossible_options(args: list[str]) -> None:
 
 @for_all('args', [('--station', '0'), ('--station', '254'), ('--count', '41')])
 def test_cases_are_listed_and_numbers_up_to_their_bounds_are_taken(
-        args: tuple[str, str], capsys: Output) -> None:
+        args: tuple[str, str], capsys: Output, monkeypatch: pytest.MonkeyPatch) -> None:
     assert main(['client', '--list', *args]) == 0
     assert 'silence-enquired' in capsys.readouterr().out
+    with monkeypatch.context() as reader_left:
+        reader_left.setattr('abdf1_ros.cli.terminal.drop_output', Mock())
+        reader_left.setattr('builtins.print', Mock(side_effect=BrokenPipeError))
+        assert main(['client', '--list', *args]) == 1

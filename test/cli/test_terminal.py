@@ -66,7 +66,7 @@ def environment(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
-    now = [0.0]
+    now = [100.0]
     monkeypatch.setattr(terminal.time, 'monotonic', lambda: now[0])
     return now
 
@@ -106,7 +106,8 @@ def test_file_with_the_name_of_a_port_is_a_file(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path('ttyS1.cap').touch()
-    assert [*map(is_port, ('ttyS1.cap', 'ttyS1', 'ttyS2.cap'))] == [False, True, True]
+    assert [*map(is_port, ('ttyS1.cap', 'ttyS1', 'ttyS2.cap', 'tcp://x'))] == [
+        False, True, True, True]
 
 
 def test_columns_of_a_table_are_aligned() -> None:
@@ -124,7 +125,7 @@ def test_progress_on_a_terminal_is_one_line(monkeypatch: pytest.MonkeyPatch,
     progress.show('1 of 9')
     progress.clear()
     assert screen.getvalue() == ''  # what takes no time needs none
-    clock[0] = 2.5
+    clock[0] = 102.5
     progress.show('2 of 9')
     progress.show('3 of 9')
     progress.clear()
@@ -137,11 +138,11 @@ def test_progress_elsewhere_comes_every_two_seconds(monkeypatch: pytest.MonkeyPa
     file = io.StringIO()
     monkeypatch.setattr('sys.stderr', file)
     progress = Progress()
-    for tenth in range(50):
-        clock[0] = tenth / 10
+    for tenth in range(70):
+        clock[0] = 100 + tenth / 10
         progress.show(f'{tenth}')
     progress.clear()
-    assert file.getvalue() == '20\n40\n'
+    assert file.getvalue() == '20\n40\n60\n'
 
 
 def test_output_that_is_closed_takes_all(monkeypatch: pytest.MonkeyPatch) -> None:
