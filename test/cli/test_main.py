@@ -68,7 +68,7 @@ for _ in range(300):
 
 TELLING = """import os, sys
 with open(os.environ['TOLD'], 'w') as file:
-    links = [os.readlink(f'/proc/self/fd/{number}') for number in range(3)]
+    links = [f'{os.readlink(f"/proc/self/fd/{n}")} {os.get_inheritable(n)}' for n in range(3)]
     print(file.fileno(), *links, file=file)
 print('lost')
 print('lost', file=sys.stderr)
@@ -90,7 +90,7 @@ def test_no_file_takes_the_place_of_a_closed_stream(tmp_path: Path, closed: str)
     assert done.returncode == 7
     number, *links = told.read_text().split()
     assert int(number) > 2
-    assert links == ['/dev/null'] * 3
+    assert links == ['/dev/null', 'True'] * 3
 
 
 @pytest.mark.parametrize('name', long_unless(
@@ -152,11 +152,14 @@ def test_signal_before_a_command_has_its_own_handlers_ends_quietly(
 
 def test_process_with_threads_of_rclpy_or_pyserial_ends_at_once() -> None:
     for name in COMMANDS:
-        program = (f'import atexit, sys, types; from abdf1_ros.cli.main import COMMANDS, run\n'
-                   f'sys.modules[COMMANDS["{name}"][0]] = types.SimpleNamespace(main=lambda: 3)\n'
-                   f'atexit.register(print, "later"); print("said"); sys.exit(run("{name}"))')
+        program = (f'import atexit, signal, sys, types; from abdf1_ros.cli.main import *\n'
+                   f'sys.modules[COMMANDS["{name}"][0]] = types.SimpleNamespace('
+                   f'main=lambda: sys.stderr.close() or 3)\natexit.register(print, "later")\n'
+                   f'atexit.register(signal.raise_signal, signal.SIGINT)  # another Ctrl-C\n'
+                   f'print("said"); sys.exit(run("{name}"))')
         done = subprocess.run([sys.executable, '-c', program], text=True, stdout=subprocess.PIPE,
-                              timeout=PATIENCE, check=False)
+                              timeout=PATIENCE, check=False,
+                              env=os.environ | {'PYTHONUNBUFFERED': ''})
         ends_later = name not in ('node', 'lines', 'simulator')
         assert (done.returncode, done.stdout) == (3, 'said\n' + 'later\n' * ends_later), name
 

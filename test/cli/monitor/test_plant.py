@@ -18,15 +18,17 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 import signal
 import time
+from unittest.mock import Mock
 
 from abdf1_ros.cli.monitor import view
 from abdf1_ros.cli.monitor.command import main
+from abdf1_ros.cli.monitor.node import Listening
 from abdf1_ros.cli.monitor.plant import LineState, PlantWatch, render_plant
 from abdf1_ros.cli.monitor.view import ShownStatus, SILENCE, Style
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 import pytest
 from rclpy.node import Node
-from support.commands import call, Output
+from support.commands import call, Output, Said
 from support.ros import ERROR, Observer, OK, PATIENCE
 
 NOW = 1000.0
@@ -148,14 +150,21 @@ def test_spare_is_named() -> None:
 
 def test_nobody_is_heard(capsys: Output, monkeypatch: pytest.MonkeyPatch) -> None:
     give_up = time.monotonic() + PATIENCE  # a bridge of a test before may not have left yet
-    while (said := call(main, capsys, '--all', '--once', '--wait', '0.1', '--seconds', '0.2')
+    while (said := call(main, capsys, '--all', '--wait', '0.1', '--seconds', '0.2')
            ).status == 0 and time.monotonic() < give_up:
         pass
     assert (said.status, said.out.splitlines()[0]) == (
         1, 'no line is heard; diagnostics come every second')
-    monkeypatch.setattr('abdf1_ros.cli.monitor.command.limit_output', lambda: None)
-    monkeypatch.setattr(PlantWatch, 'wait', lambda *_: signal.raise_signal(signal.SIGINT))
-    assert call(main, capsys, '--all', '--once').status == 0
+    monkeypatch.setattr('abdf1_ros.cli.monitor.command.limit_output', limited := Mock())
+    monkeypatch.setattr(Listening, 'wait', lambda self, until, seconds: seconds in (9, 0.1) and
+                        signal.raise_signal(signal.SIGINT))  # between two pictures, in the search
+    said = call(main, capsys, '--all', '--period', '9')
+    assert (said.status, said.out.count('no line'), limited.call_count) == (0, 1, 1)
+    assert call(main, capsys, '--node', '/x') == Said(0, '', '')
+    monkeypatch.setattr('abdf1_ros.cli.terminal.drop_output', Mock())
+    for error, status in ((BrokenPipeError(), 0), (OSError(28, 'full'), 2)):
+        monkeypatch.setattr('builtins.print', Mock(side_effect=error))
+        assert call(main, capsys, '--all', '--once').status == status
 
 
 def test_one_picture_waits_for_visible_bridges(

@@ -341,9 +341,10 @@ def test_newest_value_stands_last_and_the_range_is_that_of_the_curve() -> None:
 
 
 def test_time_without_a_good_value_is_blank() -> None:
-    assert drawn((20, [1]), (18, [2]), (2, [1]), (0, [2])).strip() == '▁██      ▁█'
+    assert drawn((20, [1]), (18, [2]), (2, [1]), (1, [2]), (0, [2])).strip() == '▁██      ▁█'
     # Good for 5 s, from the end of its step on.
     assert drawn((0.1, [1]), promised=5.0, now=NOW + 6).strip() == '▁▁▁▁'
+    assert drawn((0, [1]), promised=4.0, now=NOW + 6).strip() == '▁▁▁'
 
 
 def test_topic_that_promises_nothing_keeps_its_value() -> None:
@@ -359,12 +360,12 @@ def test_bit_is_drawn_between_0_and_1() -> None:
 
 def test_bit_that_blinks_faster_than_the_steps_is_seen() -> None:
     blinking = [(second / 4, [0, second % 2]) for second in reversed(range(40))]
-    assert set(drawn(*blinking, is_bits=True).strip()) == {'▁', '█'}
+    assert drawn(*blinking, is_bits=True).strip() == '▁█▁█▁▁'
 
 
 def test_peak_within_a_step_is_seen() -> None:
-    assert drawn((3, [5]), (1.9, [4]), (1.5, [9]), (1, [8])).strip() == '▁█▆'
-    assert drawn((3, [9]), (1.9, [9]), (1.5, [1]), (1, [2])).strip() == '█▁▂'
+    assert drawn((3, [5]), (1.9, [4]), (1.7, [9]), (1.5, [5]), (1, [8])).strip() == '▁█▆'
+    assert drawn((3, [9]), (1.9, [9]), (1.7, [1]), (1.5, [5]), (1, [2])).strip() == '█▁▂'
 
 
 def test_value_that_comes_late_in_a_step_holds_from_then_on() -> None:
