@@ -163,7 +163,10 @@ def test_only_the_statuses_of_the_node_count(bridge: Bridge, watch: NodeWatch) -
               for name in ('line_a: link', 'cell/line_ab: link', 'other/line_a: link')]
     bridge.diagnostics.publish(DiagnosticArray(status=[*others, link]))
     bridge.diagnostics.publish(DiagnosticArray(status=others))
-    (found,) = until(watch, lambda picture: picture.statuses).statuses
+    picture = until(watch, lambda picture: picture.statuses)
+    watch.spin_once(0.2)  # the others
+    assert watch.snapshot().told == picture.told
+    found, = picture.statuses
     assert (found.section, found.message, found.style, found.values) == (
         'link', 'WARN: slow', Style.WARNING, {'settings': '9600 baud'})
     bridge.status('cell/line_a: station 1', 'ERROR: silent', DiagnosticStatus.ERROR)
@@ -178,13 +181,16 @@ def test_spare_of_the_same_name_does_not_hide_the_owner_of_the_line(
     until(watch, lambda picture: [status.section for status in picture.statuses] == ['standby'])
     bridge.status('cell/line_a: standby', 'OK: still waits', DiagnosticStatus.OK)
     until(watch, lambda picture: picture.statuses[0].message == 'OK: still waits')
-    bridge.status('cell/line_a: link', 'OK: port open', DiagnosticStatus.OK)
+    monkeypatch.setattr(view, 'SILENCE', 0.0)  # but diagnostics of the owner come seldom
+    seldom = {'diagnostics period': '10 s'}
+    bridge.status('cell/line_a: link', 'OK: port open', DiagnosticStatus.OK, **seldom)
     bridge.status('cell/line_a: standby', 'OK: waits', DiagnosticStatus.OK)
     bridge.status('cell/line_ab: link', 'OK', DiagnosticStatus.OK)
     until(watch, lambda picture: [status.section for status in picture.statuses] == ['link'])
     watch.spin_once(0.2)
     assert [status.section for status in watch.snapshot().statuses] == ['link']
-    monkeypatch.setattr(view, 'SILENCE', 0.0)  # the owner has been silent for so long
+    bridge.status('cell/line_a: link', 'OK: silent for long', DiagnosticStatus.OK)
+    until(watch, lambda picture: picture.statuses[0].message == 'OK: silent for long')
     bridge.status('cell/line_a: standby', 'OK: waits', DiagnosticStatus.OK)
     until(watch, lambda picture: [status.section for status in picture.statuses] == ['standby'])
 

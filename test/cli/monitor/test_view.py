@@ -98,7 +98,7 @@ def test_every_part_can_be_found_by_its_first_line() -> None:
     picture = snapshot(statuses=[
         ShownStatus('mappings', Style.BAD, 'ERROR', {'a': 'failed'}),
         ShownStatus('writes', Style.GOOD, 'OK', {'total': '1', 'lost': '0'}),
-        ShownStatus('counters', Style.GOOD, 'OK', {'A': '1'})])
+        ShownStatus('counters', Style.GOOD, '', {'A': '1'})])
     found = {line.section: line.text for line in render(picture, NOW, WIDTH) if line.section}
     assert {name: found[name].split()[0] for name in ('reasons', 'writes', 'counters')} == {
         'reasons': 'mappings', 'writes': 'writes', 'counters': 'counters'}
@@ -224,15 +224,18 @@ def test_link_shows_load_and_poll_cycle() -> None:
         '      poll cycle with Periods  240 ms',
         '      period 100 ms            wanted 100 ms, kept 345 ms', '      last error: 2509 ERR']
     assert line_with('last error: 2509 ERR', picture).style is Style.WARNING
+    picture = snapshot(statuses=[ShownStatus('standby', Style.GOOD, 'OK: waits')])
+    assert '  standby      OK: waits' in lines(picture)
 
 
 def test_stations_are_told_from_the_active_node_table_and_the_diagnostics() -> None:
     picture = snapshot(statuses=[ShownStatus('station 1', Style.GOOD, 'OK'), ShownStatus(
-        'station 2', Style.BAD, 'ERROR: station 2 inactive', {'last answer': '4.7 s ago'})])
+        'station 22', Style.BAD, 'ERROR: station 22 inactive', {'last answer': '4.7 s ago'})])
     assert 'active stations: 1, 17' in '\n'.join(lines(picture))
-    assert styles_of('  station 2    ERROR', picture) == [Style.BAD] * 2
+    assert styles_of('  station 22   ERROR', picture) == [Style.BAD] * 2
     assert line_with('last answer  4.7 s ago', picture).style is Style.PLAIN
-    assert line_with('stations 1 OK, 2 silent', picture).style is Style.WARNING
+    assert line_with('stations 1 OK, 22 silent', picture).style is Style.WARNING
+    assert styles_of('stations 1 REM', snapshot(statuses=WITHHELD)) == [Style.WARNING]
     picture = snapshot(statuses=[ShownStatus('station 1', Style.GOOD, 'OK')])
     assert line_with('stations 1 OK', picture).style is Style.PLAIN
     assert 'active stations: none' in '\n'.join(lines(snapshot(active=[])))
@@ -242,7 +245,8 @@ def test_stations_are_told_from_the_active_node_table_and_the_diagnostics() -> N
 def test_no_sentence_is_cut_and_zeros_are_left_out() -> None:
     text = 'ERROR: port open, but none of the stations has ever answered a command'
     picture = snapshot(statuses=[
-        ShownStatus('link', Style.BAD, text, {'settings': '9600 baud', 'line load': '0'}),
+        ShownStatus('link', Style.BAD, text, {
+            'settings': '9600 baud', 'line load': '0.0', 'last error': 'none'}),
         ShownStatus('writes', Style.GOOD, 'OK: 0 of 0 writes confirmed', {'total': '0'})])
     shown = lines(picture, 44)
     assert all(len(line) <= 44 for line in shown)
@@ -341,7 +345,7 @@ def test_newest_value_stands_last_and_the_range_is_that_of_the_curve() -> None:
 
 
 def test_time_without_a_good_value_is_blank() -> None:
-    assert drawn((20, [1]), (18, [2]), (2, [1]), (1, [2]), (0, [2])).strip() == '▁██      ▁█'
+    assert drawn((20, [2]), (18, [1]), (2, [1]), (1, [2]), (0, [2])).strip() == '█▁▁      ██'
     # Good for 5 s, from the end of its step on.
     assert drawn((0.1, [1]), promised=5.0, now=NOW + 6).strip() == '▁▁▁▁'
     assert drawn((0, [1]), promised=4.0, now=NOW + 6).strip() == '▁▁▁'
