@@ -76,16 +76,6 @@ def test_good_files_show_their_plan_and_no_error(check: Check) -> None:
     assert out.endswith('no errors, no warnings\n')
 
 
-def test_descriptions_are_shown_where_there_are_any(files: Paths, capsys: Output) -> None:
-    write_csv(files[0], NET_HEADER, [GOOD_NET])
-    write_csv(files[1], MAP_HEADER + ',Description', [
-        GOOD_ROW + ',"Roller, hall 3"', 'door,Read,B3:0/1,1,PLC5,1,100,'])
-    assert main([*map(str, files)]) == 0
-    head, roller, door = capsys.readouterr().out.splitlines()[3:6]
-    assert head.endswith('stale ms  description') and roller.endswith('  Roller, hall 3')
-    assert 'hall' not in door
-
-
 @pytest.mark.parametrize('prefix', ['', 'peer_', 'heartbeat_'])
 def test_files_of_the_package_are_good_and_follow_our_own_advice(
         prefix: str, capsys: Output) -> None:
@@ -138,80 +128,12 @@ def test_files_in_the_wrong_order_are_told_once_each(
     assert ['is this the right file?' in line for line in told] == [True, True]
 
 
-def test_json_of_errors_names_place_and_number_of_each(check: Check, files: Paths) -> None:
-    content = json.loads(check('5,Mastr,9600,500', BAD_ROWS[:1], '--json', status=2))
-    mode, address = content['errors']
-    assert mode['file'] == str(files[0])
-    assert (mode['line'], mode['cell'], mode['column']) == (2, 2, 'Mode')
-    assert (mode['number'], mode['mnemonic']) == (2553, 'CRT_BAD_DRIVER_MODE')
-    assert (address['file'], address['number']) == (str(files[1]), 2503)
-    assert 'as in N7:0' in address['text']
-    assert content['network'] is content['load'] is content['scan_time_ms'] is None
-    assert content['blocks'] == content['warnings'] == []
-
-
-def test_rows_tell_what_a_ros_user_gets(files: Paths, capsys: Output) -> None:
-    write_csv(files[0], NET_HEADER, [GOOD_NET])
-    write_csv(files[1], 'Tag,Command,Address,Station,PLC_Type,Topic,Scale,Offset', [
-        'level,ReadWrite,N7:1,1,PLC5,tank/level,0.1,-40', 'alive,Heartbeat,N10:0,1,PLC5,,,',
-        'speed,Read,N7:2,1,PLC5,,0.5,'])
-    assert main([*map(str, files), '--json']) == 0
-    level, alive, speed = json.loads(capsys.readouterr().out)['rows']
-    assert level == {
-        'tag': 'level', 'command': 'ReadWrite', 'address': 'N7:1', 'station': 1,
-        'topics': ['~/read/tank/level', '~/write/tank/level'], 'message': 'Float32MultiArray',
-        'length': 1, 'value': 'int16 * 0.1 -40', 'stale_ms': level['stale_ms'], 'description': ''}
-    assert 300 < level['stale_ms'] < 600
-    assert (alive['topics'], alive['message'], alive['stale_ms']) == ([], '', None)
-    assert speed['value'] == 'int16 * 0.5'
-    assert main([*map(str, files)]) == 0
-    row, = (line for line in capsys.readouterr().out.splitlines() if line.startswith('alive '))
-    assert row.split() == ['alive', 'N10:0', '1', '1', 'int16']
-
-
 def test_notes_are_no_warnings(check: Check) -> None:
     bits = 'bits,Read,B3:0/0,1,PLC5,3,1000'
     note = 'bits without While: bits; their values go on when the program of the PLC stops'
     assert check(GOOD_NET, (bits,)).endswith(f'\nnote: {note}\nno errors, no warnings\n')
     content = json.loads(check(GOOD_NET, (bits,), '--json'))
     assert (content['notes'], content['warnings']) == ([note], [])
-
-
-def test_mode_slave_has_no_time_that_its_master_decides(check: Check) -> None:
-    net = GOOD_NET.replace('Master', 'Slave')
-    content = json.loads(check(net, (GOOD_ROW,), '--json'))
-    assert [content[name] for name in ('scan_time_ms', 'longest_transaction_ms', 'end_ms')] == [
-        None, None, None]
-    said = check(net, (GOOD_ROW,))
-    assert 'the master of this line decides when we read and write, so no time is known' in said
-    assert 'expected poll cycle' not in said
-
-
-def test_json_of_a_plan(check: Check) -> None:
-    rows = (GOOD_ROW, 'fast,Read,F8:0,1,SLC,,50')
-    content = json.loads(check(GOOD_NET, rows, '--json', '--response-time', '20'))
-    assert list(content) == [
-        'errors', 'warnings', 'notes', 'network', 'mappings', 'rows', 'blocks', 'scan_time_ms',
-        'load', 'longest_transaction_ms', 'needed_baud', 'bounds', 'end_ms', 'end_in_silence_ms',
-        'response_time_ms']
-    assert content['blocks'][1]['last'] == 'F8:0'
-    assert content['blocks'][0] == {
-        'station': 1, 'plc_type': 'PLC5', 'first': 'N7:0', 'last': 'N7:1', 'words': 2,
-        'bytes': 4, 'packets': 1, 'line_ms': 54.167, 'total_ms': 94.167, 'period_ms': 1000.0,
-        'tags': ['speed']}
-    assert content['network']['baud'] == 9600
-    assert {warning['kind'] for warning in content['warnings']} == {'station', 'load', 'period'}
-    # One float of an SLC is 4 bytes as two words are: 45 characters, and 40 ms.
-    assert content['scan_time_ms'] == pytest.approx(94.167 + 86.875, abs=0.01)
-    assert content['load'] == pytest.approx(0.0942 + 1.7375, abs=0.001)
-    assert (content['needed_baud'], content['response_time_ms']) == (115200, 20.0)
-
-
-def test_many_tags_of_a_block(check: Check) -> None:
-    rows = tuple(f't{number},Read,N7:{number},1,PLC5,,1000' for number in range(10))
-    assert 't6, t7 and 2 more\n' in check(GOOD_NET, rows)
-    block, = json.loads(check(GOOD_NET, rows, '--json'))['blocks']
-    assert block['tags'] == [f't{number}' for number in range(10)]
 
 
 def test_warnings_come_first_and_long_tables_are_folded(
@@ -361,17 +283,6 @@ def test_two_lines_of_a_folder_on_one_port_are_an_error(tmp_path: Path, capsys: 
         f'tap: error: {tmp_path}/tap_net.csv: /dev/ttyUSB0 is the port of glue too',
         'tap: 1 row, port /dev/ttyS6, nothing is sent',
         '6 lines: 3 good (3 of them with warnings), 3 with errors']
-
-
-def test_json_of_a_folder(tmp_path: Path, capsys: Output) -> None:
-    plant(tmp_path, press=(GOOD_NET, GOOD_ROW), glue=(GOOD_NET, BAD_ROWS[0]))
-    assert main(['--json', str(tmp_path)]) == 2
-    content = json.loads(capsys.readouterr().out)
-    assert content['others'] == []
-    lines = content['lines']
-    assert list(lines) == ['glue', 'press']
-    assert (len(lines['glue']['errors']), lines['press']['errors']) == (1, [])
-    assert lines['press']['blocks'][0]['tags'] == ['speed']
 
 
 def test_folder_without_lines_is_refused(tmp_path: Path, capsys: Output) -> None:

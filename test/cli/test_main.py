@@ -230,7 +230,8 @@ def test_all_that_commands_tell_is_as_stored(
         command, *args = shlex.split(line)
         said = call(import_module(COMMANDS[command][0]).main, capsys, *args)
         told += f'$ {line}\n{said.out}{said.err}exit status {said.status}\n'
-    told += ''.join(f'{page}:\n{page.read_text("utf-8")}' for page in sorted(Path().glob('*.html')))
+    for page in sorted(Path().glob('*.html')):
+        told += f'{page}:\n{page.read_text("utf-8")}'
     for path in sorted(Path().glob('*.zip')):
         with ZipFile(path) as bundle:
             told += ''.join(f'{name}:\n{bundle.read(name).decode()}' for name in bundle.namelist()

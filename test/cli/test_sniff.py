@@ -388,7 +388,8 @@ def test_signal_ends_it_while_its_output_is_not_taken(
 def test_lost_port_ends_with_the_summary(tmp_path: Path) -> None:
     pty = Pty(tmp_path / 'line')
     saved = tmp_path / 'saved'
-    with Process('sniff', '--port', str(pty.name), '--save', str(saved), '--html', '/x/y') as sniff:
+    options = '--port', str(pty.name), '--save', str(saved), '--html', '/no/where'
+    with Process('sniff', *options) as sniff:
         sniff.wait_for('sniff: ')
         pty.write(SAID[1])
         sniff.wait_for('? ')
