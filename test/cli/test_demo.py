@@ -17,6 +17,7 @@
 from contextlib import suppress
 import os
 from pathlib import Path
+import re
 import signal
 import time
 from typing import Any
@@ -92,7 +93,12 @@ def test_bridge_and_folder_end_with_a_demo_that_is_killed(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv('TMPDIR', str(tmp_path))
     with Observer() as observer, Process('demo', '--peer', '--seconds', '60') as story:
-        story.wait_for('2. ')
+        story.wait_for('is notified')
+        told = [re.sub(r' *-?[0-9.]+', '#', line) for line in story.lines
+                if not line.startswith(('node: ', 'simulator: ')) and 'look on' not in line]
+        assert [*told, ''] == Path(__file__).with_name('stored').joinpath(
+            'demo.txt').read_text('utf-8').split('\n')
+        assert any(re.fullmatch('node: INFO /.*/line: open', line) for line in story.lines)
         assert 'abdf1' in observer.node.get_node_names()
         children = Path(f'/proc/{story.number}/task/{story.number}/children')
         bridge = Path('/proc', children.read_text(encoding='ascii').split()[0], 'stat')

@@ -230,6 +230,8 @@ def test_faults_of_a_data_file_are_told_with_their_cells(capsys: Output, tmp_pat
         'SLC',
         f'simulator: {path}:5:3 (Address): SLC has no Q files; file types: O, I, S, B, T, C, R, '
         'N, F, ST, A, D, L, PD, MG, HSC, PTO, PWM, STI, EII']
+    path.write_text(DATA.partition('1,')[0], encoding='utf-8')
+    assert _refused(capsys, '--data', str(path)) == f'simulator: {path}: has no stations\n'
     path.write_text(DATA + '2,SLC,F10:0,,,,\n', encoding='utf-8')
     told = _refused(capsys, '--data', str(path), '--ladder', '2')
     assert told.startswith('simulator: --ladder 2: ') and 'it needs N10, ' in told
@@ -313,7 +315,7 @@ def test_outage_is_told_once_and_faults_of_a_full_duplex_plc_are_those_of_its_li
     said: list[str] = []
     cast.say = said.append
     is_open, lost = PortState(True, 'open'), PortState(False, 'lost')
-    for state in (is_open, lost, lost, PortState(False, 'x', PortKind.NO_CLIENT), is_open, lost):
+    for state in (is_open, lost, lost, is_open, lost, PortState(False, 'x', PortKind.NO_CLIENT)):
         links.call_args.kwargs['on_state'](state)
     assert said == ['lost', 'lost']
     line, port = lines.return_value.open.return_value, links.call_args.args[1]()
@@ -334,13 +336,18 @@ def test_broadcast_by_radio_reaches_every_plc(
     cast = Cast(parse_options(['--data', str(data), '--radio']))
     cast.close()
     line = ScriptedLine(links.call_args.args[0])
-    write, read, reply = (frames.message_frame(bytes.fromhex(text), Checksum.CRC) for text in (
-        'ff 05 0f 00 11 02 aa 02 07 89 00 00 2a 00', SLC_READ, '05 02 4f 00 10 02 2a 00 fe ff'))
+    texts = ('ff 05 0f 00 11 02 aa 02 07 89 00 00 2a 00', SLC_READ,
+             '05 02 4f 00 10 02 2a 00 fe ff', 'ff 05 0f 00 12 02 aa 02 07 89 00 00 2b 00')
+    write, read, reply, late = (
+        frames.message_frame(bytes.fromhex(text), Checksum.CRC) for text in texts)
     line.write(write)
     for fault, heard in (('silent 2', b''), ('normal 2', reply)):  # a silent PLC executes nothing
         cast.carry_out(fault)
         line.write(read)
         assert line.read(1.0) == heard
+        line.write(late)
+    cast.carry_out('power 2')
+    links.return_value.exchange.assert_not_called()  # the modem has power
 
 
 def test_lamps_of_a_ladder_are_told_though_no_command_comes(
