@@ -217,29 +217,6 @@ def test_output_that_cannot_take_it_is_no_traceback(
 # A folder
 
 
-def plant(folder: Path, **lines: tuple[str, str]) -> None:
-    """Write the files of many lines."""
-    for port, (name, (net, row)) in enumerate(lines.items(), 2):
-        write_csv(folder / f'{name}_net.csv', NET_HEADER, [f'{net.removesuffix(",1")},{port}'])
-        write_csv(folder / f'{name}_map.csv', MAP_HEADER, [row])
-
-
-def test_folder_has_a_line_of_text_for_each_pair(tmp_path: Path, capsys: Output) -> None:
-    plant(tmp_path, press=(GOOD_NET, GOOD_ROW), glue=(GOOD_NET, GOOD_ROW))
-    (tmp_path / 'hall' / 'paint').mkdir(parents=True)
-    write_csv(tmp_path / 'hall' / 'paint' / 'net.csv', NET_HEADER,
-              [GOOD_NET.replace('Master', 'Slave')])
-    write_csv(tmp_path / 'hall' / 'paint' / 'map.csv', MAP_HEADER, [GOOD_ROW])
-    write_csv(tmp_path / 'notes.csv', 'a', ['b'])
-    assert main([str(tmp_path)]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert [line.partition(':')[0] for line in lines] == ['glue', 'hall/paint', 'press', '3 lines']
-    assert lines[-1] == \
-        '3 lines: 3 good (0 of them with warnings), 0 with errors; not part of a line: notes.csv'
-    assert lines[0].startswith('glue: 1 row, port /dev/ttyS2, poll cycle ')
-    assert lines[1] == 'hall/paint: 1 row, port /dev/ttyS0, load 7%'
-
-
 def test_lines_stand_in_the_order_of_their_numbers(tmp_path: Path, capsys: Output) -> None:
     for port, name in enumerate(('line10_', 'line2.', 'line1-'), 1):
         write_csv(tmp_path / f'{name}net.csv', NET_HEADER, [f'{GOOD_NET[:-1]}{port}'])
@@ -250,17 +227,6 @@ def test_lines_stand_in_the_order_of_their_numbers(tmp_path: Path, capsys: Outpu
     *lines, total = capsys.readouterr().out.splitlines()
     assert [line.partition(':')[0] for line in lines] == ['line1', 'line2', 'line10']
     assert total.endswith(' 0 with errors; not part of a line: line1_map.csv')
-
-
-def test_error_of_one_pair_is_named_and_the_others_are_told(
-        tmp_path: Path, capsys: Output) -> None:
-    plant(tmp_path, press=(GOOD_NET, GOOD_ROW), glue=('255,Master,9600,500,300', GOOD_ROW))
-    (tmp_path / 'lone_net.csv').write_text((tmp_path / 'press_net.csv').read_text())
-    assert main([str(tmp_path)]) == 2
-    out = capsys.readouterr().out
-    assert f'glue: error: {tmp_path}/glue_net.csv:2:1 (Station): 2552 ' in out
-    assert f'lone: error: {tmp_path}/lone_map.csv: ' in out
-    assert '\npress: 1 row, ' in out
 
 
 def test_two_lines_of_a_folder_on_one_port_are_an_error(tmp_path: Path, capsys: Output) -> None:
