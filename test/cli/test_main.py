@@ -229,7 +229,8 @@ def test_all_that_commands_tell_is_as_stored(
     for line in Path('commands.txt').read_text('utf-8').splitlines():
         command, *args = shlex.split(line)
         said = call(import_module(COMMANDS[command][0]).main, capsys, *args)
-        told += f'$ {line}\n{said.out}{said.err}exit status {said.status}\n'
+        out = said.out.replace(os.getcwd(), 'HERE')
+        told += f'$ {line}\n{out}{said.err}exit status {said.status}\n'
     for page in sorted(Path().glob('*.html')):
         told += f'{page}:\n{page.read_text("utf-8")}'
     for path in sorted(Path().glob('*.zip')):
