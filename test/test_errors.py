@@ -19,7 +19,7 @@ from abdf1_ros.counters import Counters, numbered
 from abdf1_ros.messages import Event, Message, Severity
 from abdf1_ros.numbers import decimal_number, two_readings, whole_number
 from abdf1_ros.problems import ConfigurationError, Place, Problem
-from abdf1_ros.text import by_number, first, printable
+from abdf1_ros.text import age_text, by_number, cut, first, milliseconds, printable, utc_text
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
@@ -34,8 +34,8 @@ def test_what_callers_can_catch() -> None:
     assert all(issubclass(error, errors.Abdf1Error) for error in links + others)
     assert {error for error in links + others if issubclass(error, errors.LinkError)} == {*links}
     assert issubclass(errors.FormatError, ValueError)
-    error = errors.RemoteError(0xF0, 0x06, 'no such place')
-    assert (error.sts, error.ext_sts, str(error)) == (0xF0, 0x06, 'no such place')
+    error = errors.RemoteError(0xF0, 0x00, 'no such place')
+    assert (error.sts, error.ext_sts, str(error)) == (0xF0, 0x00, 'no such place')
 
 
 @for_all(('error', 'text'), [
@@ -132,6 +132,8 @@ def test_text_takes_as_many_arguments_as_it_has_places(message: Message) -> None
 
 
 @for_all(('shown', 'text'), [
+    (age_text(5.0, 4.9), '0.0 s'), (cut('abcdef', 2), '..'), (milliseconds(0.0), '0 ms'),
+    (utc_text(1.5), '1970-01-01T00:00:01.500+00:00'),
     (Message.ERR_BAD_CRC.text(0x0A, 0xFF, 0, 1),
      'Response with wrong CRC (actual=0x0aff, expected=0x0001)'),
     (Message.ERR_WRONG_MESSAGE.text(1, 0x20, 0x2A),

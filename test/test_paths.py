@@ -83,11 +83,11 @@ print('last words')
 
 
 def test_second_signal_does_not_begin_the_end_again() -> None:
-    begun: list[float] = []
-    end = EndRequest((), lambda: begun.append(end.when))
+    begun: list[tuple[float, bool]] = []
+    end = EndRequest((), lambda: begun.append((end.when, end.is_set())))
     for _ in range(2):
         end.set()
-    assert begun == [end.when]
+    assert begun == [(end.when, False)]
     assert end.is_set()
 
 
@@ -99,6 +99,7 @@ def test_signals_of_others_do_not_begin_the_end() -> None:
         for number, seconds in zip(numbers, (0.2, 30.0), strict=True):
             signal.raise_signal(number)
             ended.append(end.wait(seconds))
+    assert callable(signal.getsignal(signal.SIGTERM))  # a late signal does not kill it
     for number, handler in zip(numbers, before, strict=True):
         signal.signal(number, handler)
     assert ended == [False, True]

@@ -236,7 +236,7 @@ def test_all_that_commands_tell_is_as_stored(
     for path in sorted(Path().glob('*.zip')):
         with ZipFile(path) as bundle:
             told += ''.join(f'{name}:\n{bundle.read(name).decode()}' for name in bundle.namelist()
-                            if name.endswith('.txt'))
+                            if name != 'versions.json')
     if 'UPDATE_STORED' in os.environ:
         (stored / name / 'told.txt').write_text(told, 'utf-8')
     assert told == (stored / name / 'told.txt').read_text('utf-8')
