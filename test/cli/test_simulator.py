@@ -206,7 +206,8 @@ def _refused(capsys: Output, *options: str, status: int = 2) -> str:
       '--at', '2 scan 2 x'), 2, '--at: scan 2 x: "x" should be'),
     (('--radio', '--at', '5 full 2'), 2, '--at: station 2 is behind a radio modem, where "full"'),
     (('--full-duplex', '1', '--at', '5 slow 1 2'), 2, '--at: station 1 is on a full-duplex line,'),
-    (('--full-duplex', '7'), 2, '--full-duplex: name a station (1, 2)'),
+    *(((option, name), 2, f'{option}: name a station (1, 2)') for option, name in (
+        ('--full-duplex', '7'), ('--full-duplex', ''), ('--ladder', '22'))),
     (('--data', '/nowhere'), 2, '/nowhere: cannot be read: No such file or directory'),
     (('--pty', '/nowhere/plc'), 1, '/nowhere/plc cannot be made: No such file or directory'),
     (('--pty', '/proc/stat'), 1, '/proc/stat exists already, and no simulator has made it; '
@@ -311,7 +312,7 @@ def test_outage_is_told_once_and_faults_of_a_full_duplex_plc_are_those_of_its_li
         monkeypatch: pytest.MonkeyPatch, data: Path) -> None:
     monkeypatch.setattr('abdf1_ros.cli.simulator.LinkThread', links := Mock())
     monkeypatch.setattr('abdf1_ros.cli.simulator.SerialEndpoint', lines := Mock())
-    cast = Cast(parse_options(['--data', str(data), '--port=/dev/ttyS0', '--full-duplex=1']))
+    cast = Cast(parse_options(['--data', str(data), '--port=/dev/ttyS0', '--full-duplex=2']))
     said: list[str] = []
     cast.say = said.append
     is_open, lost = PortState(True, 'open'), PortState(False, 'lost')
@@ -320,13 +321,13 @@ def test_outage_is_told_once_and_faults_of_a_full_duplex_plc_are_those_of_its_li
     assert said == ['lost', 'lost']
     line, port = lines.return_value.open.return_value, links.call_args.args[1]()
     line.read.return_value = b'x'
-    for fault, heard in (('silent 1', b''), ('normal 1', b'x'), ('noise 1 1', b'x')):
+    for fault, heard in (('silent 2', b''), ('normal 2', b'x'), ('noise 2 1', b'x')):
         cast.carry_out(fault)
         assert port.read(0.0, 0) == heard
         port.write(b'x')
     first, second = (call.args[0] for call in line.write.call_args_list)  # a silent PLC sends none
     assert first == b'x' != second
-    cast.carry_out('power 1')  # waiting replies are lost
+    cast.carry_out('power 2')  # waiting replies are lost
     links.return_value.exchange.assert_called_once()
 
 
