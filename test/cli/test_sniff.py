@@ -280,7 +280,7 @@ def test_packets_go_nowhere_else_than_into_pcapng(
 
 
 @for_all('args', [
-    [], ['x', '--port', 'y'], ['--port', 'x', '--tap', 'y', 'z'], ['x', '--save', 'y'],
+    [], ['x', '--port', 'y'], ['--port', 'x', '--tap', 'y', 'z'], ['x', '--binary', '--save', 'y'],
     ['--port', 'x', '--binary'], ['--tap', 'x'], ['--tap', 'x', 'x'],
     ['--port', 'x', '--save', 'y', '--html', './y'],
     ['x', '--report', 'r', '--conformance', 'y', '--html', 'y'],

@@ -176,7 +176,9 @@ def test_processor_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str],
     lines = ['# abdf1_ros capture 1', '# check: CRC', '# duplex: full']
     asked, told = pair('diag_status_slc504')
     halted = told.data[:18] + b'\x5E\x20' + told.data[20:]
-    said = [asked._replace(dst=4), told._replace(src=4, data=halted), asked, told]
+    said = [asked._replace(dst=4), told._replace(src=4, data=halted), asked, told,
+            asked._replace(dst=5), told._replace(src=5, data=b'\xEE'),
+            asked._replace(dst=6), told._replace(src=6, data=b'\xEE\x34')]
     for number, station in enumerate((9, told.src), 1):  # they refuse the question
         said.append(asked._replace(dst=station, tns=asked.tns + number))
         said.append(said[-1].reply(b'')._replace(sts=0x10))
@@ -187,12 +189,14 @@ def test_processor_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str],
     report = tmp_path / 'report.zip'
     assert main([str(path), '--summary', '--report', str(report)]) == 0
     text = unpacked(report)['processors.txt']
-    assert [line.partition('status ')[0] for line in text.splitlines()] == [
-        'station 1: SLC 5/04 series B revision 3, RUN; ',
+    assert [line.partition('; status ')[0] for line in text.splitlines()] == [
+        'station 1: SLC 5/04 series B revision 3, RUN',
         'station 4: SLC 5/04 series B revision 3, RUN; major error 0x0000, processor halted; '
-        'forces installed; ']
+        'forces installed', 'station 5: ee (a diagnostic status of 1 bytes)',
+        'station 6: unknown processor (EE 34)']
     assert main([str(path), '--summary', '--report', str(report), '--anonymous']) == 0
-    assert 'status ' not in unpacked(report)['processors.txt']
+    told = unpacked(report)['processors.txt']
+    assert 'EE' not in told.upper() and told.endswith('of 1 bytes\nstation 6: unknown processor\n')
     monkeypatch.setattr(sniff_report, 'MOST_ENTRIES', 1)
     assert main([str(path), '--summary', '--report', str(report)]) == 0
     files = unpacked(report)
@@ -208,7 +212,8 @@ def test_file_that_cannot_be_had_is_named(
         capsys: pytest.CaptureFixture[str], options: tuple[str, ...]) -> None:
     monkeypatch.chdir(tmp_path)
     assert main([capture, '--summary', *options]) == 2
-    assert '/nowhere/' in capsys.readouterr().err
+    told, = capsys.readouterr().err.splitlines()  # and not what is in the bundle
+    assert '/nowhere/' in told
 
 
 def test_only_a_bundle_is_replaced(tmp_path: Path, capture: str,
@@ -233,7 +238,7 @@ def test_files_of_one_name_are_all_in_the_bundle(tmp_path: Path, capture: str) -
     for folder in ('one', 'two', 'three'):
         (tmp_path / folder).mkdir()
         names.append(str(tmp_path / folder / 'net.csv'))
-        Path(names[-1]).write_text(f'Station\n{len(names)}\n', encoding='utf-8')
+        Path(names[-1]).write_bytes(b'Station\n%d\xFF\n' % len(names))
     report, other = tmp_path / 'report.zip', tmp_path / 'one' / 'line.cap'
     other.write_text('1.0 > 10 05\n', encoding='ascii')
     assert main([capture, str(other), '--summary', '--report', str(report),
