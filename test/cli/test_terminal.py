@@ -321,3 +321,5 @@ def test_commands_are_told_as_they_can_be_pasted(
     monkeypatch.setenv('AMENT_PREFIX_PATH', f'/nowhere:{workspace}')
     assert called('plc') == 'ros2 run abdf1_ros plc'
     assert called('check') == 'abdf1 check'
+    monkeypatch.setenv('PATH', str(venv))  # without ros2
+    assert called('plc') == 'plc'
