@@ -17,6 +17,7 @@
 from dataclasses import replace
 import math
 
+from abdf1_ros.df1.frames import MAX_LINK_DATA
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome
 from abdf1_ros.plan.bounds import (
@@ -132,8 +133,8 @@ def test_rule_16_counts_that_words_of_bits_may_be_read_and_written_back() -> Non
 def test_rule_16_longest_packet_of_any_read_counts_also_of_one_on_demand() -> None:
     """And the remarks on the times count the same transactions."""
     slow = Network(baud=1200, timeout=300)
-    reports = [make_report(slow, Rows([speed(), make_mapping('N9:0', plc='SLC', length=length,
-                                                             is_on_demand=is_on_demand)]), 0.1)
+    reports = [make_report(slow, Rows([speed(), make_mapping('N10:0'), make_mapping(
+        'N9:0', plc='SLC', length=length, is_on_demand=is_on_demand)]), 0.1)
                for length, is_on_demand in ((118, False), (119, False), (118, True))]
     assert len({report.times.longest for report in reports}) == 1
     for report in reports:
@@ -168,7 +169,7 @@ def test_rule_16_standard_polling_adds_its_scans_and_slave_has_no_bound() -> Non
 
 def test_rule_16_what_plcs_ask_of_us_takes_turns_with_our_commands() -> None:
     served, long = (make_mapping('N7:50', 'Serve', station=5, length=length)
-                    for length in (1, 101))
+                    for length in (1, 200))
     alone, = Times(QUICK, Rows([speed()])).bounds()
     beside, = Times(QUICK, Rows([speed(), served])).bounds()
     longer, = Times(QUICK, Rows([speed(), served, long])).bounds()
@@ -178,7 +179,7 @@ def test_rule_16_what_plcs_ask_of_us_takes_turns_with_our_commands() -> None:
     assert shared.seconds and shared.seconds - alone.seconds > 2 * 2 * 400 * 10 / 19200
     assert alone.usual and shared.usual and shared.usual - alone.usual > 2 * 400 * 10 / 19200
     assert beside.usual and longer.usual and beside.usual > alone.usual
-    assert longer.usual - beside.usual == pytest.approx(3 * 200 * 10 / 19200)
+    assert longer.usual - beside.usual == pytest.approx(3 * (MAX_LINK_DATA - 2) * 10 / 19200)
     peer = Times(replace(QUICK, mode='Peer'), Rows([speed()]))
     assert peer.at_most(peer.any_frames) > peer.longest
 
@@ -251,10 +252,10 @@ def test_rule_16_period_shorter_than_a_scan_is_warned_of() -> None:
 
 
 def test_rule_16_transactions_longer_than_period_or_fallback_after_are_warned_of() -> None:
-    of_beat, of_speed = remarks(Network(), Rows([beat(), speed()]), ())
+    of_beat, of_speed = remarks(Network(), Rows([beat(), speed(16_000)]), ())
     assert 'one transaction may take 8380 ms' in of_beat
     assert 'its Period is 1000 ms' in of_beat
-    assert 'Fallback_After 3000 ms is shorter than two transactions' in of_speed
+    assert 'Fallback_After 16000 ms is shorter than two transactions' in of_speed
     long = [make_mapping('N7:0', 'Write', length=1000, fallback=Fallback((0,) * 1000, after))
             for after in (1490, 1500)]
     (cut,) = [text for text in remarks(QUICK, Rows(long), ()) if 'a write of all its' in text]
@@ -356,7 +357,7 @@ def test_rule_5_mode_slave_has_no_time_for_an_end() -> None:
 
 
 def test_rule_16_rows_that_are_fast_enough_are_not_warned_of() -> None:
-    assert list(remarks(QUICK, Rows([beat(2000), speed()]), ())) == []
+    assert list(remarks(QUICK, Rows([beat(2000), speed(2500)]), ())) == []
 
 
 def test_rule_14_timeout_is_three_planned_intervals() -> None:

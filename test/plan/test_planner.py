@@ -180,9 +180,9 @@ def _frames_time(example: Mapping, first: int, words: int,
 def test_line_time_is_that_of_the_real_frames(
         checksum: Checksum, plc: str, text: str, length: int) -> None:
     mapping = make_mapping(text, plc=plc, length=length)
-    block, = Planner(replace(LINE, checksum=checksum), 0.1).plan([mapping])
+    block, = Planner(replace(LINE, checksum=checksum, wait=0.25), 0.1).plan([mapping])
     assert len(block.requests) == 1
-    assert block.line_time == pytest.approx(_frames_time(
+    assert block.line_time == pytest.approx(0.25 + _frames_time(
         mapping, mapping.address.offset, block.requests[0].words, checksum))
 
 
@@ -442,13 +442,17 @@ def test_plan_of_several_periods_serves_all_and_is_never_worse_than_apart(
 
 def test_plan_of_two_periods_is_the_best_there_is() -> None:
     """A slow one beside a fast block, one within it, and one far from it."""
-    needed = {0.1: [Span(0, 10), Span(14, 16)], 1.0: [Span(12, 13), Span(16, 17), Span(60, 61)]}
+    needed = {0.1: [Span(200, 210), Span(214, 216)],
+              1.0: [Span(212, 213), Span(216, 217), Span(260, 261)]}
     candidates = partition(needed, MODEL, 0.0)
-    assert candidates == [Candidate(Span(0, 17), 0.1), Candidate(Span(60, 61), 1.0)]
+    assert candidates == [Candidate(Span(200, 217), 0.1), Candidate(Span(260, 261), 1.0)]
     wanted = [Candidate(span, period) for period, spans in needed.items() for span in spans]
     assert load(candidates) == pytest.approx(least_load(wanted))
     assert partition({0.1: [Span(0, 109)], 0.2: [Span(109, LIMIT)]}, MODEL, 0.0) == [
         Candidate(Span(0, LIMIT), 0.1)]
+    assert partition(  # the pair that saves most, not the last that saves anything
+        {1.0: [Span(225, 230)], 0.5: [Span(238, 240)], 0.1: [Span(233, 235)]}, MODEL, 0.0) == [
+            Candidate(Span(225, 240), 0.5), Candidate(Span(233, 235), 0.1)]
 
 
 @given(st.lists(SPANS, min_size=1, max_size=30), st.lists(SPANS, max_size=5))

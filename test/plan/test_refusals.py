@@ -186,6 +186,10 @@ def test_rows_that_overlap_and_are_too_long_together_are_two_blocks() -> None:
     plc.packet = 80
     plc.settle()
     assert plc.spans() == [(0, 60), (59, 118)]
+    plc = Plc(words(*range(110)))
+    plc.packet = 80
+    plc.settle()
+    assert (plc.spans(), plc.refused) == ([(0, 55), (55, 110)], 1)
 
 
 def test_word_that_was_refused_alone_is_not_read_with_others_after_a_search() -> None:

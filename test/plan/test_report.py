@@ -152,7 +152,8 @@ def test_blocks_go_by_station_and_then_by_row() -> None:
 
 
 def test_period_that_another_baud_rate_can_keep() -> None:
-    report = report_of(make_mapping('N7:0', length=2, period=50, tag='speed'))
+    report = report_of(make_mapping('N7:0', length=2, period=50, tag='speed'),
+                       make_mapping('N9:0', period=0))
     assert report.load == pytest.approx((TWO_WORDS + ANSWERS) / 0.05)  # 148.3 %
     assert report.needed_baud() == 19200  # 27.1 ms and 20 ms of 50 ms
     slow = report_of(make_mapping('N7:0', length=2, period=50), response=0.02)
@@ -172,11 +173,11 @@ def test_period_that_another_baud_rate_can_keep() -> None:
 def test_plcs_of_a_radio_network_work_on_their_answers_at_a_time() -> None:
     rows = [make_mapping('N7:0', station=1), make_mapping('N7:0', station=2),
             make_mapping('N9:0', 'Heartbeat', period=1000)]  # which is read every 500 ms
-    quick, slow = (report_of(*rows, response=response, mode='Radio', collision_avoidance=True)
-                   for response in (0.0, 1.0))
-    assert slow.poll_cycle == pytest.approx(quick.poll_cycle + 3 * 1.0 / 2)
+    quick, slow = (report_of(*rows, response=response, mode='Radio', collision_avoidance=True,
+                             tx_delay=delay) for response, delay in ((0.0, 0), (1.0, 5)))
+    assert slow.poll_cycle == pytest.approx(quick.poll_cycle + 3 * (1.0 / 2 + 0.010))
     # Four reads a second, a heartbeat, and half a question for the mode.
-    assert slow.load == pytest.approx(quick.load + 5.5 * 1.0 / 2) == slow.intervals()[1.0]
+    assert slow.load == pytest.approx(quick.load + 5.5 * (1.0 / 2 + 0.010)) == slow.intervals()[1.0]
 
 
 def test_guarded_rows_of_a_full_line_are_named() -> None:
@@ -276,13 +277,13 @@ def test_several_stations_in_full_duplex() -> None:
 
 
 def test_gap_that_costs_a_second_read() -> None:
-    report = report_of(make_mapping('N7:0', item=1), make_mapping('N7:200', item=2))
-    assert report.poll_cycle == pytest.approx(2 * (ONE_WORD + ANSWERS))
+    report = report_of(make_mapping('N7:0', kind='int32', item=1), make_mapping('N7:200', item=2),
+                       make_mapping('N7:5', item=3), make_mapping('N7:400', period=5000))
     remark, = report.remarks()
     assert (remark.kind, remark.station) == (RemarkKind.GAP, 1)
     assert remark.text == (
-        'station 1, N7:0 to N7:200: 2 reads with 0 words that no tag needs take 144.2 ms; '
-        'side by side in the PLC the tags would take 74.2 ms')
+        'station 1, N7:0 to N7:200: 2 reads with 3 words that no tag needs take 155.6 ms; '
+        'side by side in the PLC the tags would take 79.4 ms')
 
 
 def test_side_by_side_as_many_words_as_a_packet_takes_are_one_read() -> None:
@@ -294,7 +295,9 @@ def test_side_by_side_as_many_words_as_a_packet_takes_are_one_read() -> None:
 def test_members_of_structures_apart_are_compared_with_whole_elements() -> None:
     report = report_of(make_mapping('T4:0.ACC', item=1), make_mapping('T4:200.ACC', item=2))
     text, = texts(report, RemarkKind.GAP)
-    assert text.startswith('station 1, T4:0.ACC to T4:200.ACC: 2 reads')
+    assert text == (
+        'station 1, T4:0.ACC to T4:200.ACC: 2 reads with 0 words that no tag needs take 146.2 ms; '
+        'side by side in the PLC the tags would take 82.5 ms')
 
 
 def test_many_tags_are_not_all_named() -> None:
@@ -305,7 +308,7 @@ def test_many_tags_are_not_all_named() -> None:
 
 def test_rule_20_what_nothing_protects_is_one_note() -> None:
     fallback = Fallback((0,), 2000)
-    guarded = [make_mapping('N10:1', 'Write', tag='speed', fallback=fallback),
+    guarded = [make_mapping('N10:1', 'Write', tag='speed', fallback=fallback, station=2),
                make_mapping('N10:0', 'Heartbeat', tag='beat', period=1000,
                             condition=While(('speed',), 10_000)),
                make_mapping('N7:9', 'Serve', station=5, tag='pushed', period=1000)]
@@ -313,7 +316,7 @@ def test_rule_20_what_nothing_protects_is_one_note() -> None:
     bare = [make_mapping('N7:1', 'Write', tag='word'), make_mapping('B3:0/2', 'Write', tag='bit'),
             make_mapping('N7:3', 'ReadWrite', tag='recipe'),
             make_mapping('O:001', 'Write', tag='lamp'),
-            make_mapping('N10:5', 'Heartbeat', tag='bare', period=1000),
+            make_mapping('N10:5', 'Heartbeat', tag='bare', period=1000, station=2),
             make_mapping('N11:5', 'Heartbeat', tag='alone', period=1000, station=9),
             make_mapping('N10:6', 'Heartbeat', tag='slow', period=1000,
                          condition=While(('speed',), 10_001)),
@@ -362,11 +365,10 @@ def test_rows_promise_three_intervals_and_a_read() -> None:
 
 
 def test_time_of_an_end_is_that_of_slow_plcs() -> None:
-    fallback = Fallback((0,), 60_000)
-    rows = [make_mapping(f'N7:{number}', 'Write', tag=f'w{number}', fallback=fallback)
-            for number in range(6)]
-    assert texts(report_of(*rows), RemarkKind.INTERLOCK) == []
-    text, _ = texts(report_of(*rows, response=0.3), RemarkKind.INTERLOCK)
+    rows = [make_mapping(f'N{file}:0', 'Write', tag=f'w{file}', length=120,
+                         fallback=Fallback((0,) * 120, 60_000)) for file in (7, 9, 10)]
+    assert texts(report_of(*rows, baud=19200), RemarkKind.INTERLOCK) == []
+    text, _ = texts(report_of(*rows, baud=19200, response=0.3), RemarkKind.INTERLOCK)
     assert text.startswith('an orderly end needs 4')
 
 

@@ -86,7 +86,8 @@ def test_gateway_is_not_our_own_station(network: Network, is_wrong: bool) -> Non
 def test_rule_14_counter_has_to_be_read_often_enough_on_this_line() -> None:
     counter = make_mapping('N11:3', tag='alive', item=1)
     guarded = make_mapping('N7:0', tag='level', item=2, condition=While(('alive',), 250))
-    good, (problem,) = usable_rows(Rows([counter, guarded]), Network(baud=19200), 0.1)
+    orphan = make_mapping('N7:1', tag='orphan', item=3, condition=While(('gone',), 900))
+    good, (problem, _) = usable_rows(Rows([counter, guarded, orphan]), Network(baud=19200), 0.1)
     assert good == (counter,)
     assert str(problem) == (
         'map.csv:3 (While_Timeout): Item: 2, While_Timeout 250 ms is shorter than 3 reads '
