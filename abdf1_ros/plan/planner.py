@@ -171,10 +171,9 @@ class Planner:
     def _shortened(self, block: Block) -> list[Block]:
         words = max(request.words for request in block.requests)
         least = block.dialect.sure_read(block.start.file_type)
-        limit = max(least, words // 2)
-        if words <= least or limit < _whole(block.mappings):
+        if words <= least:
             return []
-        self._limits[block.station_area, block.span] = limit
+        self._limits[block.station_area, block.span] = max(least, words // 2)
         return [self._block(block.mappings, block.span)]
 
     def refuse(self, area: StationArea, span: Span) -> None:
