@@ -247,8 +247,7 @@ class Client(OpenLine):
             found = parse_range(text, plc_type, self._access)
             first, length = (found.first, found.length()) if isinstance(found, AddressRange) \
                 else (found, 1)
-            target = AddressedValues.of(str(first), plc_type, length, access=self._access,
-                                        processor=processor)
+            target = AddressedValues.of(str(first), plc_type, length, access=self._access)
         row = row_of(text, item, station, target, self._access, processor)
         return row, found is first
 
@@ -293,7 +292,7 @@ def _whole(name: str, value: object, low: float = -math.inf, high: float = math.
     if number is None or isinstance(value, bool) or not low <= number <= high:
         bounds = f' from {low} to {high}' if high < math.inf else ''
         raise FormatError(f'{name} {shown(repr(value))} should be a whole number{bounds}')
-    return int(number)
+    return number
 
 
 def _seconds(name: str, value: float) -> float:

@@ -227,7 +227,7 @@ def test_decimal_number_is_read_as_people_write_it(text: str, value: float) -> N
 
 
 @for_all('text', [
-    '', ' 1', '1 ', '1_000', '1_0.5', 'nan', 'inf', '-Infinity', '1e999', '\u0661', '\uff11',
+    '', ' 1', '1 ', '1_000', '1_0.5', 'nan', 'inf', '-Infinity', '-1e999', '\u0661', '\uff11',
     '1,5', '1e', 'e3', '.', '0x10', '1.2.3', '--1', '1\n'])
 def test_text_that_is_no_number_is_none(text: str) -> None:
     assert decimal_number(text) is None
