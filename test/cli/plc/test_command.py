@@ -54,6 +54,8 @@ def test_own_station_is_not_asked(plc: Plc, args: tuple[str, ...]) -> None:
 
 
 def test_own_station_is_not_taken_for_one_that_nobody_named(plc: Plc) -> None:
+    said = plc('status', '5', '--slave')  # the number that we have without an option
+    assert said.err.startswith('plc: --own-station: 5 is our own Station, so no PLC can answer')
     said = plc('read', 'N7:0', '--own-station', '1')
     assert (said.status, said.err) == (
         2, 'plc: --station: give the station to ask; 1 is our own Station\n')
@@ -148,7 +150,7 @@ def test_watch_prints_changes_and_ends_by_count(plc: Plc) -> None:
 
 
 def test_watch_tells_why_there_is_no_value(plc: Plc) -> None:
-    said = plc('watch', 'N99:0', 'N7:0', '--period', '0.05', '--count', '2')
+    said = plc('watch', 'N7:0', 'N99:0', '--period', '0.05', '--count', '2')
     assert (said.status, said.err[:11]) == (1, 'plc: sent: ')
     assert any('N99:0 no value: STS F0' in line for line in said.lines)
     assert any(line.endswith('N7:0 1200') for line in said.lines)

@@ -260,7 +260,7 @@ def test_characters_of_before_an_echo_was_seen_are_no_trace(
 
         def __init__(self, network: Network, absent: object = ()) -> None:
             self.echoes = network.baud == 19200
-            assert network.cmd_timeout == 500  # also where Timeout is short
+            assert network.cmd_timeout == max(500, network.timeout)
             self.counters.chars_received = 4
 
         def __enter__(self) -> 'EchoedSession':
@@ -272,6 +272,7 @@ def test_characters_of_before_an_echo_was_seen_are_no_trace(
     absent = Presence(1, 0.0, None, None, is_there=False, takes_commands=False)
     monkeypatch.setattr(detect, 'Session', EchoedSession)
     monkeypatch.setattr(detect, 'look_at', lambda session, station: absent)
+    assert Search(Network(timeout=800), [1]).run([9600]) is None
     search = Search(Network(timeout=100), [1])
     assert search.run([9600]) is None
     assert len(search.traces) == 3

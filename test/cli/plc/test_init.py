@@ -80,8 +80,8 @@ def test_init_writes_files_that_the_node_takes(port: str, tmp_path: Path, capsys
     mappings = with_comments_used(tmp_path / 'map.csv')
     assert len(mappings) == 15
     # What the SLC lists of its files; the PLC-5 has no such list.
-    assert [cell_of(mapping, 'Address') for mapping in mappings if mapping.station == 2][5:] == [
-        'S2:0', 'B3:0', 'N7:0', 'F10:0', 'L40:0']
+    assert [f'{row.tag} {cell_of(row, "Address")}' for row in mappings if row.station == 2][5:] == [
+        's2_2 S2:0', 'b3_2 B3:0', 'n7_2 N7:0', 'f10_2 F10:0', 'l40_2 L40:0']
     guarded = [mapping.tag for mapping in mappings if mapping.is_guarded]
     assert guarded == ['interlocks_1', 'interlocks_2']
 
@@ -108,7 +108,7 @@ def test_full_disk_leaves_no_file_but_those_of_others(tmp_path: Path) -> None:
     files = NewFiles(tmp_path / 'plant' / 'line_1', 'net.csv', 'map.csv')
     with no_file_longer_than(10), pytest.raises(ConfigurationError,
                                                 match='map.csv: cannot be written: File too'):
-        files.write('short', 'too long for it')
+        files.write('short', 'x' * 20_000)  # more than a buffer
     assert not any(path.exists() for path in files.paths)
     files.paths[1].write_text('mine', encoding='utf-8')  # while we searched
     with pytest.raises(ConfigurationError, match='map.csv: cannot be written: File exists'):
@@ -264,7 +264,7 @@ def test_rows_of_a_map_that_lie_outside_of_the_files(
     assert main(['files', '2', *line]) == 0
     assert capsys.readouterr().out == 'all rows of station 2 lie inside\n'
     path.write_text(header + 'a,Read,N7:90,2,SLC,11\nb,Read,N10:0,2,SLC,1\n'
-                    'c,Read,B12:0,2,SLC,\nd,Read,N7,2,SLC,\ne,Read,B3:1,2,SLC,\n',
+                    'c,Read,B12:0,2,SLC,\nd,Read,N7,2,SLC,\ne,Read,F10:3,2,SLC,2\n',
                     encoding='utf-8')
     assert main(['files', '2', *line]) == 1
     said = capsys.readouterr()
@@ -273,7 +273,7 @@ def test_rows_of_a_map_that_lie_outside_of_the_files(
         f'{path}:2 (Address): N7:90, Length 11: N7 has only 100 elements',
         f'{path}:3 (Address): N10:0, Length 1: file 10 is F10',
         f'{path}:4 (Address): B12:0, Length 1: there is no file 12',
-        f'{path}:6 (Address): B3:1, Length 1: B3 has only 1 element']
+        f'{path}:6 (Address): F10:3, Length 2: F10 has only 4 elements']
     path.write_text(header + 'a,Read,L40:1,2,SLC,\nb,Read,B40:0,1,PLC5,3\nc,Read,B12:0,1,PLC5,\n',
                     encoding='utf-8')  # the list of neither PLC is read
     for args, told in ((('2', '--plc-type', 'SLC'), 'all rows of station 2 lie inside\n'), (

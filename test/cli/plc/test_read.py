@@ -37,7 +37,8 @@ from support.simulator_process import Files
     (1, 'F8:0', ('--length', '3'), ['F8:0 12.5 40.25 -3.5']),
     (1, 'A10:0', ('--type', 'string', '--length', '3'), ["A10:0 'abc'"]),
     (1, 'N7:6', ('--type', 'uint32', '--word-order', 'high'), ['N7:6 65538']),
-    (1, 'T4:1-1', (), ['T4:1 8192 DN', 'T4:1.PRE 500', 'T4:1.ACC 120']),
+    (1, 'T4:0-1', (), ['T4:0 0', 'T4:0.PRE 0', 'T4:0.ACC 0', 'T4:1 8192 DN', 'T4:1.PRE 500',
+                       'T4:1.ACC 120']),
     (1, 'T4:1', (), ['T4:1 8192 DN', 'T4:1.PRE 500', 'T4:1.ACC 120']),
     (1, 'T4:1.ACC', (), ['T4:1.ACC 120']),
     (1, 'N7:0-1', ('--radix', 'bin'), ['N7:0 0000010010110000 /4 /5 /7 /10',
@@ -58,11 +59,11 @@ def test_read_shows_address_and_values(
 
 
 def test_read_shows_rows_with_their_addresses(plc: Plc) -> None:
-    said = plc('read', 'N7:10', 'B3:0/15', '--length', '18', '--station', '2')
-    assert [line.split()[0] for line in said.lines] == ['N7:10', 'N7:20', 'B3:0/15', 'B3:1/15']
+    said = plc('read', 'N7:9', 'B3:0/15', '--length', '18', '--station', '2')
+    assert [line.split()[0] for line in said.lines] == ['N7:9', 'N7:19', 'B3:0/15', 'B3:1/15']
     assert said.out.splitlines()[:2] == [
-        'N7:10  101  102  103  104    0    0    0    0    0    0',
-        'N7:20    0    0    0    0    0    0    0    0']
+        'N7:9     0  101  102  103  104    0    0    0    0    0',
+        'N7:19    0    0    0    0    0    0    0    0']
 
 
 def test_tags_of_a_map_stand_beside_addresses(plc: Plc, tmp_path: Path) -> None:
@@ -104,11 +105,10 @@ def test_rows_of_a_map_are_read_by_their_tags(plc: Plc, tmp_path: Path) -> None:
 
 def test_map_says_of_each_tag_what_options_say_of_addresses(plc: Plc, tmp_path: Path) -> None:
     path = str(write_csv(tmp_path / 'map.csv', *MAP_OF_TAGS))
-    assert plc('read', 'level', '--length', '2', '--via', '0', '--map', path).err == ''.join(
+    assert plc('read', 'level', '--length', '2', '--via', '0', '--station', '1', '--map', path
+               ).err == ''.join(
         f'plc: --{name}: is for addresses; for tags the map has this value\n'
-        for name in ('length', 'via'))
-    assert plc('read', 'level', '--station', '1', '--map', path).err == (
-        'plc: --station: the map has level at station 2\n')
+        for name in ('length', 'via')) + 'plc: --station: the map has level at station 2\n'
     assert plc('read', 'level', 'speed', '--station', '2', '--map', path).err == (
         'plc: --station: the map has speed at station 1\n')
     assert plc('read', '--station', '2', '--map', path).lines == ['N7:30 level 2330 % Tank 4 [%]']
@@ -134,16 +134,21 @@ def test_row_that_a_bridge_does_not_always_read_or_publish_is_shown(
     assert plc(*args, '--map', str(path)).lines[-1].split()[-3:] == ['N7:0', 'recipe', '1200']
 
 
-@pytest.mark.parametrize('args', [
-    ('read', 'far'), ('read', 'N7:1', '--station', '7', '--plc-type', 'SLC'),
-    ('write', 'far', '1', '--yes')])
-def test_row_behind_a_gateway_is_asked_through_it(tmp_path: Path, args: tuple[str, ...]) -> None:
+@pytest.mark.parametrize(('args', 'begin'), [
+    (('read', 'far'), '10 01 09 10 02 07 05'),  # to 9, for 7
+    (('read', 'N7:1', '--station', '7', '--plc-type', 'SLC'), '10 01 09 10 02 07 05'),
+    # Our number is that of no station and of no gateway in the map.
+    (('read', 'N7:1', '--station', '5', '--via', '12'), '10 01 0C 10 02 05 0D'),
+    (('watch', 'N7:1', '--station', '7', '--plc-type', 'SLC'), '10 01 09 10 02 09 05'),  # an echo
+    (('write', 'far', '1', '--yes'), '10 01 09 10 02 07 05')])
+def test_row_behind_a_gateway_is_asked_through_it(
+        tmp_path: Path, args: tuple[str, ...], begin: str) -> None:
     path = write_csv(tmp_path / 'map.csv', 'Tag,Command,Address,Station,PLC_Type,Via',
-                     ['far,ReadWrite,N7:0,7,SLC,9'])
+                     ['far,ReadWrite,N7:0,7,SLC,9', 'other,Read,N7:0,10,SLC,11'])
     line = Pty(tmp_path / 'line')
     with Process('plc', *args, '--map', str(path), '--port', str(line.name), '--timeout',
                  '9000') as process:
-        assert line.read(6) == bytes.fromhex('10 01 09 10 02 07')  # to 9, for 7
+        assert line.read(7) == bytes.fromhex(begin)
         wait_until(lambda: process.catches(signal.SIGTERM))
         process.send(signal.SIGTERM)
         process.result()
@@ -234,7 +239,10 @@ def test_read_goes_on_after_a_refusal(plc: Plc, tmp_path: Path) -> None:
                      ['gone,Read,N7:0,9,PLC5', 'far,Read,N99:0,2,SLC'])
     said = plc('read', 'far', '--map', str(path))
     assert said.err.startswith('plc: far (N99:0) of station 2: STS ')
-    assert plc('read', '--map', str(path), *FAST).err.splitlines()[-1].startswith('plc: sent: ')
+    *lines, last = plc('read', '--map', str(path), *FAST).err.splitlines()
+    assert last.startswith('plc: sent: ') and [line[5:29] for line in lines] == [
+        'gone (N7:0) of station 9', 'asked with 9600 baud, pa', 'far (N99:0) of station 2',
+        '"plc files 2" lists its ']
 
 
 def test_read_over_a_net_file(line: str, files: Files, capsys: Output) -> None:

@@ -26,7 +26,7 @@ from abdf1_ros.cli.plc.command import main
 from abdf1_ros.errors import FormatError, PortLost
 import pytest
 from support.cases import for_all
-from support.commands import Output, PATIENT, Plc
+from support.commands import Output, PATIENT, Plc, Said
 from support.ptys import PATIENCE, Pty, wait_until
 from support.ros import Process, write_csv
 
@@ -235,9 +235,8 @@ def test_write_broken_off_is_unknown(tmp_path: Path, write: str) -> None:
 
 
 def test_write_names_its_station_where_there_may_be_several(plc: Plc) -> None:
-    said = plc('write', 'N7:21', '5', '--yes')
-    assert (said.status, said.lines) == (2, [])
-    assert said.err == (
-        'plc: --station: give the station to write to: this line may have several stations\n')
+    for mode in ((), ('--radio',), ('--slave',)):
+        assert plc('write', 'N7:21', '5', '--yes', *mode) == Said(2, '', (
+            'plc: --station: give the station to write to: this line may have several stations\n'))
     assert plc('write', 'N7:21', '5', '--yes', '--station', '2').lines == [
         'N7:21 of station 2: written; now:', 'N7:21 5']
