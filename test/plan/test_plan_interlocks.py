@@ -410,12 +410,14 @@ def test_rule_8_mode_of_a_plc_that_we_write_to_by_ourselves_is_asked_every_two_s
 
 
 @for_all(('rows', 'command', 'after', 'is_late'), [
-    (5, 'Write', None, False), (40, 'Write', None, True), (5, 'Write', 3000, False),
+    (5, 'Write', None, False), (7, 'Write', None, True), (5, 'Write', 3000, False),
     (4, 'Write', 300, True), (3, 'Write', 300, False), (40, 'Serve', None, False)])
 def test_newest_state_that_may_be_too_old_on_a_full_line_is_named(
         rows: int, command: str, after: int | None, is_late: bool) -> None:
     map_rows = Rows([make_mapping(
-        f'N7:{number}', command, tag=f'w{number}', fallback=after and Fallback((0,), after))
+        f'N7:{number}', command, tag=f'w{number}', length=1 if after else 100,
+        fallback=Fallback((0,), after) if after and number == rows - 1 else None)
         for number in range(rows)])
     texts = [text for text in remarks(QUICK, map_rows, ()) if 'newest value may be older' in text]
-    assert [text.partition(':')[0] for text in texts] == ['w0'] * is_late
+    assert [text.partition(':')[0] for text in texts] == [
+        f'w{rows - 1}' if after else 'w0'] * is_late

@@ -145,8 +145,8 @@ def test_status_words_of_other_processors_are_no_clock(
 
 
 @for_all(('seconds', 'text'), [
-    (0.4, 'as this computer'), (-1.2, 'as this computer'),
-    (90, '0:01:30 ahead of this computer'), (-3600, '1:00:00 behind this computer')])
+    (1.4, 'as this computer'), (-1.4, 'as this computer'), (1.6, '0:00:02 ahead of this computer'),
+    (90, '0:01:30 ahead of this computer'), (-3600.4, '1:00:00 behind this computer')])
 def test_drift_is_told_in_words(seconds: float, text: str) -> None:
     assert told(datetime(2026, 1, 2, 3, 4, 5), timedelta(seconds=seconds)) == \
         f'2026-01-02 03:04:05, {text}'

@@ -259,7 +259,7 @@ def test_help_of_all_commands_loads_next_to_nothing() -> None:
 
 
 @for_all(('words', 'parsed'), [
-    (['help'], ['--help']), (['help', 'read'], ['read', '--help']),
+    (['help'], ['--help']), (['help', 'read', 'N7:0'], ['read', '--help']),
     (['read', 'help'], ['read', '--help']), (['read', 'N7:0'], ['read', 'N7:0']), ([], [])])
 def test_help_is_also_a_word(words: list[str], parsed: list[str]) -> None:
     assert help_asked(words) == parsed

@@ -256,6 +256,7 @@ def test_nothing_old_stays_below_a_table_that_shrinks(
     healed = show((60, 5), *((row, array('h', [5])) for row in rows))
     assert healed[1:] == [
         'address station type age s value', 'N7:0 1 int16 * 5', 'C5:0.ACC 1 int16 * 5']
+    assert show((60, 5)) == healed
     # What a narrower window did with the lines before is not known: it begins at its top.
     assert show((52, 9)) == healed[1:]
     watch.counters.nak_retries, watch.counters.enq_retries = 1, 2
