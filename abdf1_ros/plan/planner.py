@@ -280,9 +280,8 @@ def _span(mapping: Mapping) -> Span:
     return span if mapping.address.is_value(words) else span.aligned(_per_element(mapping))
 
 
-def _cover(mappings: Iterable[Mapping]) -> Span:
+def _cover(mappings: Sequence[Mapping]) -> Span:
     """Return the words to read for ``mappings``, which lie in one block."""
-    mappings = list(mappings)
     spans = list(map(_span, mappings))
     if len(set(spans)) == 1:
         return spans[0]

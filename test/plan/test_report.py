@@ -97,8 +97,8 @@ def test_times_of_one_read(plc: str, settings: dict[str, object], line_time: flo
 
 
 def test_map_without_a_row_is_odd() -> None:
-    remark, = report_of().remarks()
-    assert (remark.kind, remark.station) == (RemarkKind.MAP, None)
+    odd, remark = report_of(data_bits=7).remarks()
+    assert (odd.kind, remark.kind, remark.station) == (RemarkKind.SETTING, RemarkKind.MAP, None)
     assert remark.text == 'the map has no usable row: nothing is read or written'
 
 
@@ -145,8 +145,8 @@ def test_via_is_for_a_master(mode: str) -> None:
 
 
 def test_blocks_go_by_station_and_then_by_row() -> None:
-    report = report_of(make_mapping('N7:0', station=2, item=1), make_mapping('F8:0', item=2),
-                       make_mapping('B3:0', item=3))
+    report = report_of(make_mapping('N7:0', station=2, item=1), make_mapping('B3:0', item=3),
+                       make_mapping('F8:0', item=2))
     assert [(block.station, str(block.start)) for block in report.blocks] == [
         (1, 'F8:0'), (1, 'B3:0'), (2, 'N7:0')]
 

@@ -142,6 +142,7 @@ def test_read_that_fails_is_a_line_of_csv_without_a_value(plcs: Plcs, capsys: Ou
     for value in (7, 8):  # it answers for a moment
         watch.read(SPEED, array('h', [value]))
         watch.show()
+        watch.show()
     assert [line.partition(',')[2] for line in capsys.readouterr().out.splitlines()[1:]] == [
         f'1,N7:0,{value}' for value in ('', 7, '', 8, '')]
 
