@@ -97,8 +97,8 @@ def test_what_never_happens_is_named(
     monkeypatch.undo()
     with pytest.raises(LookupError, match='there is no station 9; the data has 1'):
         cell.plcs.word('N7:0', station=9)
-    with pytest.raises(ValueError, match='70000 is not a word'):
-        cell.plcs.set('N7:0', 70000)
+    with pytest.raises(ValueError, match='65536 is not a word'):
+        cell.plcs.set('N7:0', 1, 0x10000)
 
 
 def test_what_can_never_come_is_told_at_once(abdf1_cell: Cells) -> None:  # noqa: F811
@@ -110,7 +110,7 @@ def test_what_can_never_come_is_told_at_once(abdf1_cell: Cells) -> None:  # noqa
         abdf1_cell(data, rows.format(0), 'Mode\nPeer\n')
     with pytest.raises(LookupError, match='there is no station 3'):
         abdf1_cell(data, rows.format(0), ladders=[3])
-    cell = abdf1_cell(data, rows.format(0), parameters=['net.baud:=7'])
+    cell = abdf1_cell(data, rows.format(0), parameters=['write_timeout:=1.0', 'net.baud:=7'])
     begun = time.monotonic()
     with pytest.raises(AssertionError, match='(?s)bridge has ended with 2.*Baud = "7"'):
         cell.ros.listen(Int16MultiArray, '/abdf1/read/pressure').first()
@@ -149,9 +149,11 @@ def test_log_of_a_bridge_has_all_starts_and_its_end_is_shown(
 
 def test_program_of_a_ladder_runs_in_the_station_that_is_named(tmp_path: Path) -> None:
     (tmp_path / 'data.csv').write_text(
-        'Station,PLC_Type,Address,Length\n1,SLC,N7:0,2\n2,SLC,N7:0,2\n', encoding='utf-8')
-    plcs = Plcs(tmp_path / 'data.csv', ladders=[2])
-    assert [plcs[number].ladder is None for number in (1, 2)] == [True, False]
+        'Station,PLC_Type,Address,Length\n1,SLC,N7:0,2\n2,SLC,N7:0,2\n3,SLC,N7:0,2\n', 'utf-8')
+    plcs = Plcs(tmp_path / 'data.csv', ladders=[2, 3])
+    assert [plcs[number].ladder is None for number in (1, 2, 3)] == [True, False, False]
+    plcs.set('N7:0', -0x8000, 0xFFFF)
+    assert [plcs.word('N7:0'), plcs.word('N7:1')] == [0x8000, 0xFFFF]
     plcs.lose()
 
 

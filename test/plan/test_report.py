@@ -333,7 +333,7 @@ def test_bits_that_go_on_without_the_program_are_noted_and_are_not_odd() -> None
     rows = [make_mapping('B3:0/0', tag='door', period=1000),
             make_mapping('B3:0/1', tag='guarded', period=1000, condition=run),
             make_mapping('B3:0/2', 'ReadWrite', tag='command', period=1000),
-            make_mapping('N7:0', tag='word', period=1000)]
+            make_mapping('N7:0', station=2, period=1000, condition=While(('alive',), 9000))]
     # A command of 7 bytes in a frame of 16, ACK 2, poll 4, reply of 32 in a frame of 38, ACK 2.
     cost, bits, _ = report_of(*rows).notes()
     assert bits == ('bits without While: door; their values go on when the program of the '

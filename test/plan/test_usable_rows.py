@@ -121,8 +121,9 @@ def test_problems_go_with_their_rows() -> None:
     *((row, 'Period): Item: 1, Mode Listen needs a Period above 0: the longest time (ms) between '
        'two reads of these words by the other master')
       for row in (make_mapping(), make_mapping(period=0), make_mapping(is_on_demand=True))),
-    (make_mapping('I:1', plc='SLC', access='Flat', period=100), 'Access): Item: 1, Mode Listen '
-     'does not understand reads with Access Flat'),
+    *((make_mapping(text, plc=plc, access=access, period=100), 'Access): Item: 1, Mode Listen '
+       f'does not understand reads with Access {access}')
+      for text, plc, access in (('I:1', 'SLC', 'Flat'), ('020', 'PLC2', 'CIF'))),
     (make_mapping(length=200, period=100), 'Length): Item: 1, 200 words never come in one reply, '
      'which has 122 at most; divide the row'),
     (make_mapping(length=122, period=100), ''),  # another master may use word range reads

@@ -33,6 +33,7 @@ from abdf1_ros.cli.plc.presence import (
     type_to_say,
 )
 from abdf1_ros.cli.plc.session import Session
+from abdf1_ros.counters import Counters
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import FormatError, StationInactive
 from abdf1_ros.pccc.identity import Identity, Mode
@@ -58,6 +59,8 @@ def test_everything_a_station_has_said() -> None:
         '  program ID 0x1A2B', '  memory     16 K', '  reply      after 31 ms']
     assert describe(Presence(2, 0.0, Identity(None, 'type 7'), None, True, True)) == [
         'station 2: type 7', '  faults     none', '  reply      after 0 ms']
+    assert presence.traffic(Counters(nak_retries=1, enq_retries=2)).startswith(
+        'sent: 0 commands, 0 polls, 3 repetitions included; ')
 
 
 def test_station_that_does_not_say_what_it_is() -> None:
