@@ -286,7 +286,7 @@ def test_arguments_of_the_line(tmp_path: Path) -> None:
             ({'baud': True}, 'baud True'), ({'baud': 0}, 'baud 0'),
             ({'baud': 14400}, 'baud 14400 should be one of 1200, '),
             ({'retries': 11}, 'retries 11 should be a whole number from 0 to 10'),
-            ({'timeout': 60000}, 'timeout 60000 should be seconds above 0, up to 60; 60 for 60000 ms'),
+            ({'timeout': 60000}, ' 60000 should be seconds above 0, up to 60; 60 for 60000 ms'),
             ({'cmd_timeout': '1'}, "cmd_timeout '1' should be seconds above 0, up to 60$"),
             ({'timeout': 60001}, ' 60$'), ({'timeout': 0}, 'timeout 0 '),
             ({'timeout': math.nan}, 'timeout nan'),

@@ -175,9 +175,9 @@ def test_plcs_of_a_radio_network_work_on_their_answers_at_a_time() -> None:
             make_mapping('N9:0', 'Heartbeat', period=1000)]  # which is read every 500 ms
     quick, slow = (report_of(*rows, response=response, mode='Radio', collision_avoidance=True,
                              tx_delay=delay) for response, delay in ((0.0, 0), (1.0, 5)))
-    assert slow.poll_cycle == pytest.approx(quick.poll_cycle + 3 * (1.0 / 2 + 0.010))
+    assert slow.poll_cycle == pytest.approx(quick.poll_cycle + 3 * 0.51)  # half of 1 s, 2 * 5 ms
     # Four reads a second, a heartbeat, and half a question for the mode.
-    assert slow.load == pytest.approx(quick.load + 5.5 * (1.0 / 2 + 0.010)) == slow.intervals()[1.0]
+    assert slow.load == pytest.approx(quick.load + 5.5 * 0.51) == slow.intervals()[1.0]
 
 
 def test_guarded_rows_of_a_full_line_are_named() -> None:

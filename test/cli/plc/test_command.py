@@ -97,7 +97,7 @@ def test_ping_of_nobody_has_status_1_and_says_that_nothing_came(plc: Plc) -> Non
 
 def test_ping_of_which_one_fails_is_a_failure(plc: Plc, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr('abdf1_ros.cli.plc.presence.ping', Mock(
-        side_effect=[FormatError('other bytes came'), 0.001, KeyboardInterrupt, KeyboardInterrupt]))
+        side_effect=[FormatError('other bytes came'), 0.001, *[KeyboardInterrupt] * 2]))
     said = plc('ping', '1', '--count', '9')
     assert (said.status, said.lines[1][:19]) == (1, '2 sent, 1 answered;')
     assert plc('ping', '1') == Said(1, '0 sent, 0 answered\n', '')

@@ -80,8 +80,8 @@ def test_init_writes_files_that_the_node_takes(port: str, tmp_path: Path, capsys
     mappings = with_comments_used(tmp_path / 'map.csv')
     assert len(mappings) == 15
     # What the SLC lists of its files; the PLC-5 has no such list.
-    assert [f'{row.tag} {cell_of(row, "Address")}' for row in mappings if row.station == 2][5:] == [
-        's2_2 S2:0', 'b3_2 B3:0', 'n7_2 N7:0', 'f10_2 F10:0', 'l40_2 L40:0']
+    assert [(row.tag, cell_of(row, 'Address')) for row in mappings if row.station == 2][5:] == [
+        (f'{name.lower()}_2', f'{name}:0') for name in ('S2', 'B3', 'N7', 'F10', 'L40')]
     guarded = [mapping.tag for mapping in mappings if mapping.is_guarded]
     assert guarded == ['interlocks_1', 'interlocks_2']
 

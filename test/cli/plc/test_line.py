@@ -23,12 +23,10 @@ import threading
 
 from abdf1_ros.cli.plc.line import DEFAULTS, network_of
 from abdf1_ros.cli.plc.parser import help_asked, make_parser
-from abdf1_ros.cli.plc.session import opened, Session
-from abdf1_ros.df1 import frames
-from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.errors import PortLost
 from abdf1_ros.pccc.dialect import Steps
-from abdf1_ros.pccc.steps import echo, identify
+from abdf1_ros.pccc.steps import identify
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.network import Network
 import pytest
@@ -103,29 +101,11 @@ def network_on(line: Pty) -> Network:
                    error_code='BCC')
 
 
-def test_port_that_is_not_there(tmp_path: Path) -> None:
-    network = Network(com_port=str(tmp_path / 'nothing'))
-    with pytest.raises(OSError):
-        opened(network)
-    with pytest.raises(OSError):
-        Session(network)
-
-
 def test_port_is_held_from_the_beginning(line: Pty) -> None:
     with Session(network_on(line)), pytest.raises(OSError):
         Session(network_on(line))
     with Session(network_on(line)) as session:
         assert session.counters.chars_sent == 0
-
-
-def test_answer_to_an_echo_ends_the_request(line: Pty) -> None:
-    with Session(network_on(line)) as session:
-        pending = session.start(1, echo(b'\x05'))
-        tns = line.read(13)[6:8]
-        reply = b'\x05\x01\x46\x00' + tns + b'\x05'
-        line.write(frames.ACK + frames.message_frame(reply, Checksum.BCC))
-        assert session.wait(pending) is None
-        assert session.counters.replies_received == 1
 
 
 def test_lost_port_ends_the_order_and_those_after_it(line: Pty) -> None:

@@ -226,13 +226,6 @@ class Damages(PortAround):
         super().write(data if start < 0 else data[:-1] + bytes([data[-1] ^ 1]))
 
 
-def test_scan_of_nobody_ends_after_two_rounds(tmp_path: Path) -> None:
-    line = Pty(tmp_path / 'line')
-    seen, = scan(Network(com_port=str(line.name), timeout=50), [1])
-    line.close()
-    assert (seen.is_there, seen.asked) == (False, 2)
-
-
 def test_scan_asks_more_often_while_frames_come_damaged(tmp_path: Path) -> None:
     plc = simulated_plc(1, 'SLC', time.monotonic)
     with plc_line(tmp_path / 'line', plc, around=Damages) as name:

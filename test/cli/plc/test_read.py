@@ -27,7 +27,6 @@ import pytest
 from support.commands import call, FAST, Output, PATIENT, Plc, running_simulator, Said
 from support.ptys import Pty, wait_until
 from support.ros import Process, write_csv
-from support.simulator_process import Files
 
 
 @pytest.mark.parametrize('station, address, options, lines', [
@@ -243,8 +242,3 @@ def test_read_goes_on_after_a_refusal(plc: Plc, tmp_path: Path) -> None:
     assert last.startswith('plc: sent: ') and [line[5:29] for line in lines] == [
         'gone (N7:0) of station 9', 'asked with 9600 baud, pa', 'far (N99:0) of station 2',
         '"plc files 2" lists its ']
-
-
-def test_read_over_a_net_file(line: str, files: Files, capsys: Output) -> None:
-    net = write_csv(files.folder / 'plc.csv', 'Com_Port,Baud,Timeout', [f'{line},115200,1000'])
-    assert call(main, capsys, 'read', 'N7:0', '--net', str(net)).lines == ['N7:0 1200']

@@ -354,8 +354,3 @@ def test_mode_of_each_plc_and_faults_of_the_line_stand_around_the_values(
     assert draw([other, SPEED, NAME], size=(100, 2)) == lines[:1]
     monkeypatch.setattr(LiveValues, 'faults_of_line', lambda self: ['line: 3 repeated, 1 damaged'])
     assert draw([SPEED], (SPEED, array('h', [5])))[-1] == 'line: 3 repeated, 1 damaged'
-
-
-def test_port_that_is_not_there() -> None:
-    with pytest.raises(OSError):
-        LiveValues(Network(com_port='/nowhere/tty'), [SPEED], 0.1)
