@@ -158,7 +158,7 @@ def test_each_row_of_a_name_says_where_it_is_used(tmp_path: Path) -> None:
 
 
 def test_symbols_of_rslogix_become_rows_and_the_rest_is_told(tmp_path: Path) -> None:
-    rows = RSLOGIX + ('"DFILE:N7","","","Numbers"\n"PLS10:0","Global","CAM"\n'
+    rows = RSLOGIX + ('"DFILE:N7","files","","Numbers"\n"PLS10:0","Global","CAM"\n'
                       '"","Global","LOST"\n"PLS11:0","Global",""\n')
     mappings, left_out = imported(tmp_path, rows)
     assert [(mapping.tag, mapping.name, str(mapping.address), mapping.length, mapping.description)
@@ -309,8 +309,8 @@ def test_columns_of_a_list_are_found_by_their_names(tmp_path: Path) -> None:
     symbols = 'Address,Symbol,Description\nN7:0,SPEED,a;b;c;d;e;f;g;h\nB3:0/5,RUN,\n'
     assert told(imported(tmp_path, symbols)[0]) == [
         ('SPEED', 'Read', 'N7:0', 'a;b;c;d;e;f;g;h'), ('RUN', 'Read', 'B3:0/5', '')]
-    drawing = ('sep=;\nAddress;Description 1;Description 2;Wire No;Name;Device Tag\n'
-               'I:1.0/0;START;CONVEYOR;1000;Button;PB100\n')
+    drawing = ('sep=;\nAddress;Description 1;Description 2;Wire No;Name;Device Tag;Comment\n'
+               'I:1.0/0;START;;1000;Button;PB100;CONVEYOR\n')
     assert told(imported(tmp_path, drawing)[0]) == [('PB100', 'Read', 'I:1.0/0', 'START CONVEYOR')]
     access = ('Tag Name,Data Type,Address,Read Only\na,INT,N7:0,no\nb,DINT,N7:2,Yes\n'
               'c,Real,F8:0,R/W\nd,Word,N7:4,perhaps\ne,LWORD,N7:5,no\n')

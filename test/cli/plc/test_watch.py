@@ -261,7 +261,8 @@ def test_nothing_old_stays_below_a_table_that_shrinks(
     # What a narrower window did with the lines before is not known: it begins at its top.
     assert show((52, 9)) == healed[1:]
     watch.counters.nak_retries, watch.counters.enq_retries = 1, 2
-    assert show((52, 9))[-1] == 'line: 3 repeated, 0 damaged'
+    assert show((52, 4))[-2:] == [
+        '+2 more; a higher window shows them', 'line: 3 repeated, 0 damaged']
     watch.counters.bcc_errors, watch.counters.crc_errors = 3, 4
     monkeypatch.setattr('abdf1_ros.cli.plc.watch.MARKED', 0.0)  # as after its second
     assert show((60, 9))[-2:] == ['C5:0.ACC 1 int16 5', 'line: 3 repeated, 7 damaged']
