@@ -27,7 +27,7 @@ from unittest.mock import Mock
 
 from abdf1_ros.cli.plc.command import main
 from abdf1_ros.cli.plc.verbs import scan
-from abdf1_ros.errors import FormatError
+from abdf1_ros.errors import FormatError, PortLost
 import pytest
 from support.cases import for_all
 from support.commands import call, FAST, Output, PATIENT, Plc, running_simulator, Said
@@ -96,11 +96,12 @@ def test_ping_of_nobody_has_status_1_and_says_that_nothing_came(plc: Plc) -> Non
 
 
 def test_ping_of_which_one_fails_is_a_failure(plc: Plc, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr('abdf1_ros.cli.plc.presence.ping', Mock(
-        side_effect=[FormatError('other bytes came'), 0.001, *[KeyboardInterrupt] * 2]))
+    monkeypatch.setattr('abdf1_ros.cli.plc.presence.ping', Mock(side_effect=[
+        FormatError('other bytes came'), 0.001, *[KeyboardInterrupt] * 2, PortLost('gone')]))
     said = plc('ping', '1', '--count', '9')
     assert (said.status, said.lines[1][:19]) == (1, '2 sent, 1 answered;')
     assert plc('ping', '1') == Said(1, '0 sent, 0 answered\n', '')
+    assert plc('ping', '1') == Said(1, '', 'plc: port lost: gone\n')
 
 
 def test_scan_lists_who_answers_and_counts_them(plc: Plc) -> None:

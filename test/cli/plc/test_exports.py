@@ -424,8 +424,9 @@ INTOUCH = (
 
 
 def test_tags_of_intouch(tmp_path: Path) -> None:
-    for text in (INTOUCH, INTOUCH.replace(',', ';')):
-        mappings, left_out = imported(tmp_path, text)
+    for kind in ('Disc', 'Int', 'Real', 'Msg'):
+        text = INTOUCH.replace('IODisc', f'IO{kind}').replace('IOInt', f'IO{kind}')
+        mappings, left_out = imported(tmp_path, text.replace(',', ';'))
         assert (told(mappings), left_out) == ([
             ('Run', 'ReadWrite', 'B3:0/5', 'motor runs'), ('Speed', 'ReadWrite', 'N7:0', 'speed'),
             ('N7:1', 'Read', 'N7:1', '')], [])
@@ -530,7 +531,7 @@ def test_json_of_something_else_is_no_file_of_ignition(tmp_path: Path) -> None:
 def test_tags_in_too_many_folders_are_passed_over(tmp_path: Path) -> None:
     tag = '{"name": "a", "valueSource": "opc", "opcItemPath": "[P]N7:0"}'
     for folders, tags in ((49, ['a']), (50, []), (300, [])):
-        text = '{"tags": [' * folders + tag + ']}' * folders
+        text = '[' + '{"tags": [' * folders + tag + ']}' * folders + ']'
         assert [row.tag for row in imported(tmp_path, text)[0]] == tags
 
 

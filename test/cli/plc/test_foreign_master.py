@@ -144,13 +144,14 @@ def test_two_polls_or_messages_with_a_good_check_show_a_master(
     clock = Clock()
     monkeypatch.setattr(overhear, 'time', SimpleNamespace(monotonic=clock))
 
-    def read(baud: int, wait: float) -> bytes:
-        data = heard.pop((baud, wait > overhear.LISTENED), b'')
+    def read(network: Network, wait: float) -> bytes:
+        assert network.mode == 'Listen'
+        data = heard.pop((network.baud, wait > overhear.LISTENED), b'')
         clock.now += 0.0 if data else wait
         return data
 
     monkeypatch.setattr(overhear, 'opened', lambda network: lambda: SimpleNamespace(
-        read=lambda wait, wake: read(network.baud, wait), close=lambda: None))
+        read=lambda wait, wake: read(network, wait), close=lambda: None))
     found = str(overhear.overhear(Network(), [38400, 19200, 9600]))
     assert found.removeprefix('another master ') == told
 

@@ -295,7 +295,7 @@ def test_description_stands_where_there_is_room(draw: Draw) -> None:
     level = make_mapping('N7:0', tag='level', description='Tank level [%]')
     for width, title, end in ((100, 'description', 'Tank level [%]'), (48, 'value', '5 %'),
                               (54, 'description', 'Tank leve...')):
-        head, line = draw([level], (level, array('h', [5])), size=(width, 9))
+        head, line, _ = draw([level, SPEED], (level, array('h', [5])), size=(width, 9))
         assert head.endswith(title) and line.endswith(end), width
 
 
