@@ -214,7 +214,8 @@ def test_text_of_windows_with_line_ends_in_cells_and_semicolons(tmp_path: Path) 
     lambda text: text.encode('utf-16'), lambda text: text.replace(',', ', ').encode('utf-8-sig'),
     lambda text: text.replace('\n', '\r').encode(), lambda text: f'{text},,,\n'.encode(),
     lambda text: text.replace(',""\n', ',"; ; ; ; ; ; ; ; ;"\n').encode(),
-    lambda text: text.replace('I:1.0/3', 'B3/5').encode()])
+    lambda text: text.replace('I:1.0/3', 'B3/5').encode(),
+    lambda text: ('\ufeff' + text).encode('utf-16-be')])
 def test_other_forms_of_text_are_read_as_well(
         tmp_path: Path, code: Callable[[str], bytes]) -> None:
     mappings, left_out = imported(tmp_path, code(RSLOGIX))

@@ -120,13 +120,14 @@ def test_full_disk_leaves_no_file_but_those_of_others(tmp_path: Path) -> None:
 def test_plc_of_an_unknown_family_leaves_no_later_one_out() -> None:
     unknown = Identity(None, 'type 0x77')
     known = Identity(PlcType.SLC, 'SLC 5/03')
-    stopped = replace(known, mode=Mode.PROGRAM)
+    stopped = replace(known, mode=Mode.PROGRAM, processor=Processor.SLC_5_02)
     rows = ''.join(map_rows([Presence(number, 0.1, identity, None, True, True) for number, identity
-                             in enumerate((unknown, known, stopped), 1)], {}))
+                             in enumerate((unknown, known, stopped), 1)],
+                            {3: [DataFile(FileType.INTEGER, 7, 256)]}))
     assert '# words_1,' in rows and '\nstatus_2,Read,S:0,2,SLC,' in rows
     # a PLC that does not tell its mode is not guarded by it
-    assert [f'0/0,{number},SLC,,8,250,{guard},,\n' in rows
-            for number, guard in ((2, ''), (3, 'RUN'))] == [True, True]
+    assert '/0,2,SLC,,8,250,,,\n' in rows and '/0,3,SLC,5/02,8,250,RUN,,\n' in rows
+    assert rows.endswith('\n# n7_3,Read,N7:0,3,SLC,5/02,41,5000,,,\n')
 
 
 def test_gateway_leads_to_the_nodes_behind_it() -> None:

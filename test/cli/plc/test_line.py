@@ -151,6 +151,7 @@ def test_options_that_are_left_out_have_defaults() -> None:
     assert read.plc_type is read.type is read.access is read.word_order is None
     assert read.station is parse('status').station is parse('files').station is None
     assert parse('scan').stations == tuple(range(32))
+    assert parse('detect').stations == tuple(range(8))
     assert parse('ping', '3').count == 4
     assert parse('watch', 'N7:0').period == 0.5
     assert parse('watch', 'N7:0').count is None
@@ -191,10 +192,6 @@ def test_help_tells_what_detect_does_by_default(capsys: pytest.CaptureFixture[st
     for default in (9600, 'CRC', 'half', 300):
         assert f'(default: {default})' in text
     assert 'take the line from this net CSV' in text
-
-
-def test_detect_looks_for_few_stations() -> None:
-    assert parse('detect').stations == tuple(range(8))
 
 
 def test_list_of_stations_has_ranges_and_numbers() -> None:
