@@ -149,19 +149,20 @@ def test_value_that_is_none_says_what_would_be_right(address: str, text: str, ri
 
 
 class InterruptedSession:
-    """A session that is interrupted when its command is on the line already, or before."""
+    """A session that breaks off when its command is on the line already, or before."""
 
-    def __init__(self, end: Callable[[Pending[WriteResult]], None]) -> None:
-        self._end = end
+    def __init__(self, end: Callable[[Pending[WriteResult]], None], why: BaseException) -> None:
+        self._end, self._why = end, why
 
     def start(self, station: int, steps: object, pending: Pending[WriteResult]) -> None:
         self._pending = pending
-        raise KeyboardInterrupt
+        raise self._why
 
     def close(self) -> None:
         self._end(self._pending)
 
 
+@for_all('why', [KeyboardInterrupt(), PortLost('gone')])
 @for_all(('end', 'outcome', 'detail'), [
     (lambda pending: pending.fail(PortLost('closed')), Outcome.UNKNOWN, 'port lost: closed'),
     (lambda pending: pending.fail(PortLost('closed', sent=False)), Outcome.NOT_SENT,
@@ -170,9 +171,11 @@ class InterruptedSession:
     (lambda pending: pending.succeed(WriteResult(make('N7:0'), Outcome.WRITTEN, 'ok', '5')),
      Outcome.WRITTEN, 'ok')])
 def test_write_that_is_interrupted_is_unknown_if_it_was_sent_and_has_no_result(
-        end: Callable[[Pending[WriteResult]], None], outcome: Outcome, detail: str) -> None:
-    result = data.Writing(make('N7:0'), ['5']).carry_out(cast(Session, InterruptedSession(end)))
-    assert (result.outcome, result.detail) == (outcome, detail)
+        why: BaseException, end: Callable[[Pending[WriteResult]], None], outcome: Outcome,
+        detail: str) -> None:
+    session = cast(Session, InterruptedSession(end, why))
+    result = data.Writing(make('N7:0'), ['5']).carry_out(session)
+    assert (result.outcome, result.detail) == (outcome, detail or str(why))
 
 
 @for_all(('processor', 'cell'), [

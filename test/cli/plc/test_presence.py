@@ -63,11 +63,6 @@ def test_everything_a_station_has_said() -> None:
         'sent: 0 commands, 0 polls, 3 repetitions included; ')
 
 
-def test_station_that_does_not_say_what_it_is() -> None:
-    seen = Presence(2, 0.1, None, FormatError('too short'), True, True)
-    assert str(seen) == 'answers, but does not identify itself: too short'
-
-
 @pytest.mark.parametrize('identity, option', [
     (IDENTITY, ''), (Identity(None, 'unknown processor (01)'), ' --plc-type SLC'),
     (None, ' --plc-type SLC')])
