@@ -194,10 +194,6 @@ def test_help_tells_what_detect_does_by_default(capsys: pytest.CaptureFixture[st
     assert 'take the line from this net CSV' in text
 
 
-def test_list_of_stations_has_ranges_and_numbers() -> None:
-    assert parse('scan', '0-3,9').stations == (0, 1, 2, 3, 9)
-
-
 @for_all('args', [
     ('scan', ''), ('scan', '1,300'), ('ping', '1-2'), ('ping', '1', '--count', '-1'),
     ('watch', 'N7:0', '--period', '-1'), ('watch', 'N7:0', '--period', 'nan'),
