@@ -185,7 +185,7 @@ def test_retries_trace_and_log_are_arguments(port: str, tmp_path: Path,
     trace = tmp_path / 'line.cap'
     caplog.set_level('DEBUG', 'abdf1_ros')
     with client_with(port, timeout=0.1, retries=1, trace=trace) as plc:
-        plc.read('N7:0')
+        plc.read_many(['N7:0', 'N7:4'])
         plc.identify()
         before = plc.counters.nak_retries  # on a busy host
         with pytest.raises(LinkError):
@@ -197,7 +197,7 @@ def test_retries_trace_and_log_are_arguments(port: str, tmp_path: Path,
     assert events == [('DEBUG', 'NTC')] * (len(events) - 1) + [('INFO', 'ERR')] != events[:1]
     timed = [text.rpartition(': ') for text in logged if text.endswith(' ms')]
     assert [place for place, _, ms in timed if 0.0 < float(ms.split()[0]) < 60_000] == [
-        'N7:0 of station 1', 'status of station 1']
+        'N7:0, N7:4 of station 1', 'status of station 1']
     assert ' N7:0 of station 9: 2509 ERR_INACTIVE_STATION' in caplog.text.splitlines()[-1]
     wait_until(lambda: str(trace) not in {name for _, name in open_files()})
     assert sniff(['--summary', str(trace)]) == 0
