@@ -148,13 +148,16 @@ class Other(Particular):
 
 
 def test_full_duplex_port_with_station_0_is_found_and_named(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    with plc_on(tmp_path / 'line', 'CRC', Duplex.FULL, Other) as network:
-        for verb in (['detect'], ['init', '--into', str(tmp_path / 'new')]):
-            assert main([*verb, '--port', network.port, '--baud', '9600', '--duplex', 'full',
-                         '--check', 'CRC', '--timeout', '100']) == 0
-    said = capsys.readouterr().out
-    assert '--peer --station 0 --port' in said and 'watch S:0 --station 0 --net' in said
+        tmp_path: Path, capsys: pytest.CaptureFixture[str],
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr('abdf1_ros.cli.plc.overhear.LISTENED', 0.05)
+    for kind, stations, best in ((Other, '0-7', 0), (FullDuplexPeer, '0', 1)):  # answers to all
+        with plc_on(tmp_path / f'line{best}', 'CRC', Duplex.FULL, kind) as network:
+            for verb in (['detect'], ['init', '--into', str(tmp_path / f'new{best}')]):
+                assert main([*verb, '--port', network.port, '--baud', '9600', '--duplex', 'full',
+                             '--check', 'CRC', '--timeout', '100', '--stations', stations]) == 0
+        said = capsys.readouterr().out
+        assert '--peer --station 0 --port' in said and f'watch S:0 --station {best} --net' in said
 
 
 def test_radio_modem_is_found_by_replies_without_ack(
