@@ -38,9 +38,11 @@ class Bench:
         row = one(Command='Read', Address='B3:0/3', Length='2', Alarm=alarm, **cells)
         self.now = 100.0
         self.point = ReadPoint(row, 0.2, STALE)
-        self.alarms = Alarms([self.point], '/dev/plc', lambda: self.now)
+        others = [ReadPoint(one(Command='Read', Address='B3:1/0', Alarm=text), 0.2, STALE)
+                  for text in ('WARN', '')]
+        self.alarms = Alarms([*others, self.point], '/dev/plc', lambda: self.now)
         self.status: AlarmStatus
-        self.status, = self.alarms.statuses
+        _, self.status = self.alarms.statuses
 
     def read(self, *bits: int, after: float = 0.1) -> None:
         """Read the row ``after`` so many seconds."""
@@ -92,13 +94,13 @@ def test_zero_may_be_the_alarm(alarm: str) -> None:
 
 
 def test_what_is_not_known_is_never_well() -> None:
-    bench = Bench('WARN')
-    assert bench.says() == (WARN, 'unknown: its row is waiting for the first read')
+    bench = Bench('WARN', Description='Guard')
+    assert bench.says() == (WARN, 'unknown: its row is waiting for the first read: Guard')
     bench.read(0, 0)
     bench.now += STALE + 0.1
-    assert bench.says() == (ERROR, 'unknown: its row is stale')
+    assert bench.says() == (ERROR, 'unknown: its row is stale: Guard')
     bench.point.fail('STS 10')
-    assert bench.says() == (ERROR, 'unknown: its row is failed')
+    assert bench.says() == (ERROR, 'unknown: its row is failed: Guard')
 
 
 def test_column() -> None:

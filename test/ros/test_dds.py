@@ -21,6 +21,7 @@ import shutil
 import subprocess
 import sys
 from typing import Any
+from unittest.mock import Mock
 
 from abdf1_ros.ros.diagnostics import graph as graph_module
 from abdf1_ros.ros.diagnostics.dds import BEGAN_EARLY, DdsWatch, lost_locks
@@ -201,7 +202,7 @@ def test_other_type_is_told_once_and_again_when_it_comes_back(
     watch = watch_of(graph)
     domain.topics = {'/cell/abdf1/read/door': [BITS], '/cell/abdf1/read/n': [WORDS],
                      '/cell/abdf1/write/door': ['std_msgs/msg/Bool', BITS],
-                     '/other/read/door': [BITS, WORDS]}
+                     '/cell/abdf1/write/n': [BITS, WORDS], '/other/read/door': [BITS, WORDS]}
     told = [f'/cell/abdf1/write/door is {BITS}; another node uses it as std_msgs/msg/Bool, '
             'and DDS does not connect different types']
     assert [texts(watch.look(now)) for now in (10.0, 20.0)] == [told, []]
@@ -228,9 +229,15 @@ def test_nodes_of_a_process_share_a_look(domain: Domain, graph: Graph) -> None:
     assert domain.looks == 2
 
 
-def test_each_node_of_a_name_counts(domain: Domain, graph: Graph) -> None:
+def test_each_node_of_a_name_counts(
+        domain: Domain, graph: Graph, monkeypatch: pytest.MonkeyPatch) -> None:
     domain.names += [('press', '/cell'), ('press', '/')]
     assert graph.nodes('press', '/cell', 0.0) == 2
+    monkeypatch.setattr(graph_module, 'line_time', lambda: 10.0)
+    node: Any = Mock(**{'get_name.return_value': 'press', 'get_namespace.return_value': '/cell'})
+    for is_spare, told in (False, [False, True]), (True, [False, False]):
+        watch = graph.name_watch(node, is_spare=is_spare)
+        assert [bool([*watch.look(now)]) for now in (10.4, 10.5)] == told
 
 
 def changes_of(*counts: int) -> list[tuple[int, str]]:

@@ -305,14 +305,15 @@ def test_plc_that_acknowledges_and_has_nothing_to_say_for_ever_takes_in_silence(
     bench = DriverBench([make_mapping('N7:0', plc='SLC')], network=Network(polling=polling))
     plc = simulated_plc(1, 'SLC', bench.clock, ('N7:0', 4))
     bench.connect(plc)
+    link = LinkStatus(LineView(bench.driver), PORT, Seen())
+    assert 'normal poll scan' not in link.values(NOW)  # before the first has ended
     bench.run(1.0)
     station = bench.driver.stations[1]
     assert station.active and not takes_in_silence(station)
     plc.faults = InjectedFaults(slow=10**9)  # ACK of each command, EOT for each poll
     bench.run(5.0)
     assert station.active and takes_in_silence(station)
-    values = LinkStatus(LineView(bench.driver), PORT, Seen()).values(NOW)
-    assert ('normal poll scan' in values) is (polling == 'Standard')
+    assert ('normal poll scan' in link.values(NOW)) is (polling == 'Standard')
 
 
 def test_link_of_a_node_with_a_duplicate_name(bench: Bench) -> None:
@@ -333,8 +334,9 @@ def test_link_and_standby_tell_how_often_diagnostics_come(bench: Bench) -> None:
 def test_fault_is_logged_when_it_begins_and_again_after_it_was_over(bench: Bench) -> None:
     faults, stations = ['', LOST, LOST, '', LOST], bench.driver.stations
     guest: Any = SimpleNamespace(guest=Guest('pty:a'), fault='')
-    watches = watches_of(bench.diagnostics.line, PORT, bench.seen, (guest,), lambda now: [],
-                         lambda now: [], lambda now: faults[int(now - NOW)])
+    watches = watches_of(
+        bench.diagnostics.line, PORT, bench.seen, (guest,), lambda now: ['a'] * (now == NOW + 17),
+        lambda now: ['b'] * (now == NOW + 17), lambda now: faults[int(now - NOW)])
 
     def look(now: float) -> list[str]:
         return [news.text for watch in watches for news in watch.look(NOW + now)]
@@ -356,8 +358,12 @@ def test_fault_is_logged_when_it_begins_and_again_after_it_was_over(bench: Bench
     bench.driver.checks.heard(1, Identity(PlcType.SLC, 'SLC 5/03'), NOW)
     command = Packet(5, 2, 0x0F, 0, 7, b'\xAA')
     bench.driver.refused.add(command, command.reply(sts=0x10), NOW)
+    stations.lost(2, NOW)  # which the events tell
     assert [text[:24] for text in look(17.0)] == [
-        'guest pty:a: in use', 'refused a command of sta', 'station 1 is an SLC 5/03']
+        'a changed since read; ca', '~/write/b has more than ', 'guest pty:a: in use',
+        'refused a command of sta', 'station 1 is an SLC 5/03']
+    assert look(18.0) == bench.seen.changed_files == bench.seen.crowded == []
+    assert not bench.seen.dds_fault
     assert bench.says('station 1', NOW + 17.0) == (
         WARN, 'WARN: station 1 is an SLC 5/03, map.csv:2 says PLC5')
 
@@ -405,8 +411,13 @@ def test_link_tells_what_the_uart_has_counted(
     assert bench.details('link')['framing errors'] == '3'
 
 
-def test_rates_are_those_since_the_last_look(bench: Bench) -> None:
-    bench.status('link', NOW)
+def test_rates_are_those_since_the_last_look(
+        make_bench: Benches, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr('abdf1_ros.ros.diagnostics.link.line_time', lambda: NOW - 4.0)
+    bench = make_bench()
+    bench.driver.tasks.transactions = bench.driver.counters.chars_sent = 96
+    values = bench.details('link', NOW)
+    assert (values['transactions per second'], values['line load']) == ('24.0', '2 %')
     bench.driver.tasks.transactions += 30
     bench.driver.counters.chars_sent += 480
     bench.driver.counters.chars_received += 960
@@ -465,7 +476,8 @@ def test_link_tells_how_far_behind_each_period_is(bench: Bench) -> None:
         'period 0 ms': 'as often as the line allows, kept 136 ms',
         'period 100 ms': 'wanted 100 ms, kept 128 ms'}
     second.mapping = replace(second.mapping, command=Command.SERVE)
-    assert 'period 0 ms' not in periods()  # what the PLC writes has no pace of ours
+    first.mapping = replace(first.mapping, is_on_demand=True)
+    assert periods() == {}  # neither what the PLC writes nor what is asked for has our pace
 
 
 # counters
@@ -663,11 +675,12 @@ def test_rows_that_cannot_keep_their_period_are_named_with_one_that_would_do(
     assert bench.says('mappings', NOW) == (WARN, (
         'WARN: of 5 mappings 5 fresh; Period not kept: faster (Period 50 ms, kept 206 ms), '
         'fast (Period 100 ms, kept 405 ms); the line can keep Period 1000'))
-    assert 'Period' not in bench.says('mappings', NOW + 50)[1]  # no row is read any more
-    read_until(NOW + 100, {'fast': 0.1, 'slow': 1.0, 'free': 2.0, 'faster': 0.1})
-    assert bench.says('mappings', NOW + 100) == (WARN, (
-        'WARN: of 5 mappings 5 fresh; Period not kept: faster (Period 50 ms, kept 101 ms); '
-        'the line can keep Period 200'))
+    read_until(NOW + 45, {'fast': 0.14, 'slow': 1.0, 'free': 1.0, 'faster': 0.06})
+    bench.point('slow').fail('no reply')
+    assert bench.says('mappings', NOW + 45) == (ERROR, (
+        'ERROR: of 5 mappings 1 failed, 4 fresh; Period not kept: fast (Period 100 ms, kept '
+        '141 ms); the line can keep Period 200'))
+    assert 'Period' not in bench.says('mappings', NOW + 95)[1]  # no row is read any more
 
 
 def test_single_long_interval_is_no_load(bench: Bench) -> None:
@@ -737,7 +750,7 @@ def test_blocks_may_be_divided_while_the_poll_cycle_is_asked_for(bench: Bench) -
 
 
 def result(bench: Bench, outcome: Outcome, detail: str = '') -> WriteResult:
-    return WriteResult(bench.mapping('level'), outcome, detail, '[1]', 0.01)
+    return WriteResult(bench.mapping('level'), outcome, detail, '[1]', 0.01234)
 
 
 OUTCOMES: list[tuple[Outcome, dict[str, str]]] = [
@@ -766,7 +779,9 @@ def test_every_outcome_is_counted_in_its_place(
     is_failure = outcome not in (
         Outcome.WRITTEN, Outcome.STANDS, Outcome.BROADCAST, Outcome.SUPERSEDED)
     assert last == (f'level {outcome.value}: why (1.0 s ago)' if is_failure else 'none')
-    assert log.judge(NOW)[0] == (WARN if is_failure else OK)
+    level, text = log.judge(NOW)
+    assert (level, text[0]) == (
+        WARN if is_failure else OK, '01'[outcome in (Outcome.WRITTEN, Outcome.STANDS)])
 
 
 def test_writes_before_the_first(bench: Bench) -> None:
@@ -863,8 +878,8 @@ def test_guests_are_counted_and_told_of(bench: Bench) -> None:
     assert bench.details('guests') == {
         'pty:a': 'open; 1 command, 2 not allowed, 2 without reply, 3 waiting, slowest 250 ms',
         'tcp:7': 'open; 1 command, 1 not allowed, 0 without reply, 0 waiting, slowest unknown'}
-    lines[1].fault = 'in use'
-    assert bench.says('guests') == (ERROR, 'ERROR: tcp:7: in use')
+    lines[0].fault, lines[1].fault = 'gone', 'in use'
+    assert bench.says('guests') == (ERROR, 'ERROR: pty:a: gone; tcp:7: in use')
 
 
 def test_value_of_a_guest_over_a_fallback_is_a_warning(make_bench: Benches) -> None:
@@ -879,10 +894,12 @@ def test_value_of_a_guest_over_a_fallback_is_a_warning(make_bench: Benches) -> N
     guest = Claim(1, [row.mapping.extent])
     guest.done = guest.lands_until = NOW
     row.write_ended(guest, NOW)
+    row.cause = FallbackCause.TIMEOUT
     assert bench.says('interlocks') == (WARN, (
-        'WARN: 0 of 0 heartbeats count; speed: a guest has written over the fallback value'))
+        'WARN: 0 of 0 heartbeats count; speed: fallback value is due; speed: a guest has written '
+        'over the fallback value'))
     bound, = Times(bench.driver.network, bench.driver.mappings).bounds()
-    row.cause, row.refusal = FallbackCause.TIMEOUT, 'STS 10'
+    row.refusal = 'STS 10'
     assert bench.details('interlocks') == {
         'speed': 'a guest has written over the fallback value (timeout): STS 10',
         'bound of speed': str(bound).partition(': ')[2]}
@@ -924,7 +941,8 @@ def test_last_fallback_value_of_a_station_is_told_with_its_cause(make_bench: Ben
     row, = bench.driver.mappings
     assert 'line_a: interlocks' not in [status.name for status in bench.diagnostics.statuses(NOW)]
     told = Write(row, [0], NOW).result(Outcome.FALLBACK, FallbackCause.TIMEOUT.value)
-    bench.written(told, NOW)
+    for now in (NOW - 1, NOW):
+        bench.written(told, now)
     bench.written(Write(row, [0], NOW).result(Outcome.WRITTEN), NOW + 1)
     assert bench.seen.last_fallbacks == {1: ('speed: timeout', NOW)}
 
@@ -969,6 +987,7 @@ def test_failed_write_is_a_warning_for_ten_seconds(bench: Bench) -> None:
     assert bench.says('writes', NOW + 10) == (OK, 'OK: 2 of 3 writes confirmed')
     assert bench.details('writes', NOW + 10)['last failure'] == \
         'level unknown whether written: no reply (10.0 s ago)'
+    assert details(bench.results[1])['latency_ms'] == '12.3'
 
 
 def test_monitor_looks_for_values_that_there_are(bench: Bench) -> None:

@@ -74,10 +74,11 @@ def yaml_file(folder: Path, text: str) -> str:
      ['/press/press_plc', '/press/other']),
     ('abdf1:\n  ros__parameters: {a: 1}', ['/abdf1']),
     ('/**:\n  ros__parameters: {a: 1}\n/*/x:\n  ros__parameters: {}', []),
-    ('lines:\n  ros__parameters: {lines: [x]}\nx:\n  ros__parameters: {}', ['/x']),
+    ('lines:\n  ros__parameters: {lines: [x]}\nx:\n  ros__parameters: {}\n'
+     'host_b: {ros__parameters: {}}', ['/x']),
     ('', [])])
 def test_nodes_of_a_parameter_file(tmp_path: Path, text: str, expected: list[str]) -> None:
-    assert [*sections([yaml_file(tmp_path, text)])] == expected
+    assert [*sections(2 * [yaml_file(tmp_path, text)], 'host_b')] == expected
 
 
 def test_two_sections_of_one_name_are_a_fault(tmp_path: Path) -> None:
@@ -100,7 +101,7 @@ def test_parameter_file_that_cannot_be_read(tmp_path: Path, text: str | None) ->
 @pytest.mark.parametrize(('text', 'expected'), [
     ('a:\n\tros__parameters:\n\t\tport: x\n', ':2:1: a tab; YAML is indented with spaces'),
     ('a: [1\nb: 2\n', ":2:2: expected ',' or ']', but got ':'"),
-    ('a:\n  ros__parameters: {}\nhall/press-plc:\n  ros__parameters: {"x-y": 1}\n',
+    ('a:\n  ros__parameters: {}\n  hall/press-plc:\n    ros__parameters: {"x-y": 1}\n',
      ':3: "hall/press-plc" cannot name a node: letters, digits and underscores, as in '
      'hall/press_plc'),
     ('a: &x\n  ros__parameters: {}\nb: *x\n',
@@ -115,8 +116,8 @@ def test_parameter_file_that_cannot_be_read(tmp_path: Path, text: str | None) ->
     ('a:\n  ros__parameters: {b: !!python/name:os.system x}\n',
      ':2:24: the tag tag:yaml.org,2002:python/name:os.system: ROS does not know it; leave it '
      'out'),
-    ('? [a]\n: {ros__parameters: {}}\n',
-     ':1:3: a list or mapping as a name: a name should be one word')])
+    ('b: {ros__parameters: {}}\n? [a]\n: {ros__parameters: {}}\n',
+     ':2:3: a list or mapping as a name: a name should be one word')])
 def test_parameter_file_that_ros_would_refuse(tmp_path: Path, text: str, expected: str) -> None:
     path = yaml_file(tmp_path, text)
     with pytest.raises(ConfigurationError) as error, \
@@ -129,7 +130,9 @@ def test_what_is_left_out_changes_nothing_else(tmp_path: Path) -> None:
     kept = "  a:\n    ros__parameters: {day: 2001-99-99, no-1: 010, text: '5', list: [1, 2]}\n"
     path = yaml_file(tmp_path, (
         f'hall/press-plc:\n  ros__parameters: {{}}\nhall:\n  b-1: {{c: {{}}}}\n{kept}'))
-    with usable_files(['--params-file', path], leaves_out=True) as (_, usable):
+    given = ['--params-file', '/nowhere', '--params-file', path, '-p', 'x:=1']
+    with usable_files(given, leaves_out=True) as (*first, usable, option, value):
+        assert [*first, path, option, value] == given
         assert Path(usable).read_text('utf-8') == f'hall:\n{kept}'
 
 
@@ -338,11 +341,12 @@ def test_process_may_open_as_many_files_as_the_system_allows(
 
 def test_line_with_faulty_files_is_told_and_the_others_run(
         plant: Plant, capfd: Output) -> None:
-    (plant.folder / 'b_net.csv').write_text('Baud\n9601\n')
+    (plant.folder / 'b_net.csv').write_text('Baud,Parity\n9601,Much\n')
     plant.start(reads='ac')
     values = line_status(plant, ERROR)
     assert values['running'] == '2'
     assert values['/hall/b'].startswith(f'{plant.folder}/b_net.csv:2:1 (Baud): Baud = "9601"')
+    assert f'; {plant.folder}/b_net.csv:2:2 (Parity): ' in values['/hall/b']
     plant.observer.call(Trigger, '/lines/reload', Trigger.Request())
     line_status(plant, ERROR)
     told = capfd.readouterr().err.count('9601')
@@ -367,11 +371,12 @@ def test_line_whose_name_ros_refuses_is_told_and_the_others_run(
     assert [warning for warning in recwarn if 'rosout' in str(warning.message)] == []
 
 
-def test_faulty_line_ends_all_where_that_is_asked_for(plant: Plant) -> None:
+def test_faulty_line_ends_all_where_that_is_asked_for(
+        plant: Plant, end_request: EndRequest) -> None:
     (plant.folder / 'b_net.csv').write_text('Baud\n9601\n')
     plant.start('-p', 'strict_lines:=true')
     plant.thread.join(PATIENCE)
-    assert plant.end() == 2
+    assert (plant.end(), end_request.is_set()) == (2, True)
 
 
 def test_parameter_for_no_line_is_not_passed_over(plant: Plant, capfd: Output) -> None:
@@ -508,7 +513,7 @@ def test_argument_that_is_not_of_ros_is_refused(capsys: Output) -> None:
 
 
 def test_one_name_for_all_lines_is_refused(capfd: Output) -> None:
-    assert main(['lines', '--ros-args', '-r', '__node:=x']) == 2
+    assert main(['lines', '--ros-args', '-r', 'lines:__node:=y', '-r', '__node:=x']) == 2
     assert 'the sections of the parameter file name the lines, and -r lines:__node:=NAME the ' \
         'process' in capfd.readouterr().err
 

@@ -179,9 +179,9 @@ def test_row_with_other_values_has_a_publisher_that_kept_none(
     old, new = (make_mapping('F8:0', tag='a', **{'scaling': Scaling(1.8), **more})
                 for more in ({}, changed))
     topics: Any = ReadTopics
-    topics(node, published).offer({old: point})
-    assert node.noted(topics(node, published).open, {new: point}) == notes
-    assert node.noted(topics(node, published, ('/dev/other',)).open, {new: point}) == ['+a']
+    topics(node, published, ('/dev/a',)).offer({old: point})
+    assert node.noted(topics(node, published, ('/dev/a',)).open, {new: point}) == notes
+    assert node.noted(topics(node, published, ('/dev/a', '/dev/other')).open, {new: point}) == ['+a']
 
 
 @pytest.mark.parametrize(('old', 'new', 'is_fit'), [

@@ -150,8 +150,9 @@ def test_what_the_files_say_is_shown_and_nobody_else_sets_it(
         make_node: Nodes, files: Files) -> None:
     node = make_node(files | {'net.baud': '38400'})
     shown, configuration = ShownFiles(node), configure(node)
+    node.declare_parameter('free', '0')
     before = set(node.get_parameters_by_prefix(''))
-    for _ in range(2):  # files that are read again are shown anew
+    for _ in range(3):  # files that are read again are shown anew
         shown.show(configuration.network, configuration.shown_rows())
     names = set(node.get_parameters_by_prefix('')) - before
     assert names >= {f'net.{field}' for field in (
@@ -165,7 +166,8 @@ def test_what_the_files_say_is_shown_and_nobody_else_sets_it(
     assert (station.from_value, station.to_value) == (0, 254)
     for name in names:
         assert node.describe_parameter(name).description, name
-        (result,) = node.set_parameters([Parameter(name, value='1')])
+        result = node.set_parameters_atomically(
+            [Parameter('free', value='1'), Parameter(name, value='1')])
         assert not result.successful and '~/reload' in result.reason
     assert node.describe_parameter('map.line.door.plc_type').description == \
         next(column.description for column in MAP_COLUMNS if column.name == 'PLC_Type')
@@ -191,6 +193,7 @@ def test_link_parameters_are_read_as_the_file_is(
 @pytest.mark.parametrize(('values', 'port'), [
     ({}, '/dev/ttyS2'), ({'net.com_port': 1}, '/dev/ttyS0'),
     ({'net.com_port': 'socket://plc:4001'}, 'socket://plc:4001'),
+    ({'port': 'socket://plc:4001'}, 'socket://plc:4001'),
     ({'port': '/dev/ttyUSB7', 'net.com_port': 1}, '/dev/ttyUSB7'),
     ({'port': 7}, '/dev/ttyS6')])
 def test_port_is_the_parameter_or_else_com_port(
@@ -394,7 +397,7 @@ def test_number_that_yaml_takes_for_octal_is_told(
     path = tmp_path / 'shared.yaml'
     path.write_text(f'{section}:\n  ros__parameters:\n    net:\n      station: 010\n'
                     '      baud: 9600\n      timeout: "0500"\n      nak_retries: 03\n'
-                    '    poll_list: [1, 011]\n'
+                    '    poll_list: [1, 011]\n    map: {door: {max: 7}}\n'
                     '/other:\n  ros__parameters:\n    write_timeout: 010\n',
                     encoding='utf-8')
     assert problems_of(make_node(files), Arguments([str(path)])) == [
@@ -405,7 +408,7 @@ def test_number_that_yaml_takes_for_octal_is_told(
 @pytest.mark.parametrize(('rule', 'expected'), [
     ('net.station:=010', 'net.station: 010 is octal in YAML; write 10 or 8'),
     ('parameters:net.station:=010', 'net.station: 010 is octal in YAML; write 10 or 8'),
-    ('poll_list:=[010, 12]', 'poll_list: 010 is octal in YAML; write 10 or 8'),
+    ('poll_list:=[12, 010]', 'poll_list: 010 is octal in YAML; write 10 or 8'),
     ('net.station:="010"', None), ('net.station:=07', None), ('camera:gain:=010', None),
     ('camera:read_only:=true', 'camera:read_only: this node is /parameters; leave out "camera:"'),
     ('gain:=3', 'gain: there is no such parameter; another version may have it'),
@@ -522,5 +525,6 @@ def test_every_parameter_has_a_type_and_a_description() -> None:
     assert parameter_types()['read_only'] is bool
     assert parameter_types()['stale_after'] is float
     assert parameter_types()['default_period'] is int
-    assert descriptions()['stale_after'].endswith('; default: 3.0')
+    assert [descriptions()[name].rpartition(': ')[2] for name in ('stale_after', 'read_only')] == [
+        '3.0', 'False']
     assert descriptions().keys() == parameter_types().keys()

@@ -229,7 +229,7 @@ def test_files_that_cannot_be_taken_leave_topics_and_services_to_the_old_driver(
     publisher = bench.ros.publisher(Int16MultiArray, '/abdf1/write/recipe')
     node.create_publisher(String, '~/read/level', 1)  # DDS allows one type for a topic
     publishers = [*node.publishers]
-    bench.write_map(SPEED.removesuffix('2') + '3', LEVEL)
+    bench.write_map(SPEED, 'more,Read,N7:8,1,PLC5,3', LEVEL)
     with pytest.raises(rclpy_implementation.RCLError):
         node.hand_over(read_again(node.session.configuration))
     assert [*node.publishers] == publishers
@@ -336,8 +336,9 @@ def test_other_speed_opens_the_port_anew(bench: Bench, capfd: Output) -> None:
 
 def test_file_that_has_changed_is_told_once(bench: Bench, capfd: Output) -> None:
     assert details(until_status(bench.diagnostics, 'link', OK))['files'] == 'as read'
+    bench.write_net(250)
     bench.write_map(SPEED)
-    text = 'map.csv changed since read; call ~/reload to read again'
+    text = 'net.csv, map.csv changed since read; call ~/reload to read again'
     until_status(bench.diagnostics, 'link', OK, lambda status: details(status)['files'] == text)
     bench.diagnostics.clear()
     for _ in range(2):  # it has been looked at several times more

@@ -326,6 +326,7 @@ class StandIn:
         self.made: dict[str, Callable[..., Coroutine[Any, Any, Any]]] = {}
         self.closed: list[str] = []
         self.takes: list[Callable[[ReadAnswer], None]] = []
+        self.messages: list[Any] = []
 
     def create_service(self, kind: type, name: str, answer: Any, **options: object) -> str:
         assert name not in self.made
@@ -342,15 +343,16 @@ class StandIn:
         self.takes.append(take)
 
     def take(self, topic: str, *message: object) -> None:
-        """Write nothing."""
+        self.messages += message
 
 
 def test_services_of_rows_that_are_gone_close_once_when_no_call_waits() -> None:
     rows = [make_mapping(f'N7:{number}', tag=f'n{number}') for number in range(3)]
     lamps = [make_mapping(f'B3:0/{bit}', 'Write', tag=f'l{bit}', topic='lamp') for bit in (0, 1)]
     node: Any = StandIn(*rows, *lamps)
-    woken: list[str] = []
-    services = RowServices(node, node, lambda: woken.append('executor'))
+    woken: list[object] = []
+    services = RowServices(node, node, lambda: woken.append(
+        [call.done.done() for call in services.calls.values()]))
 
     def reload(*left: Mapping) -> None:
         services.open(cast(Driver, StandIn(*left)), 100, 2.0, lambda: None)
@@ -367,11 +369,13 @@ def test_services_of_rows_that_are_gone_close_once_when_no_call_waits() -> None:
         call.send(None)
         for row in lamps[:count]:
             services.take(WriteResult(row, Outcome.STANDS, '', '', request=[*services.calls][-1]))
-    assert woken == ['link', 'executor']
+    assert woken == ['link', [False, False, False, True]]
+    assert node.messages[1] == {'source_timestamp': 1, 'received_timestamp': 2,
+                                'publication_sequence_number': None}
     assert ended(puts[2]) == (True, 'l0: stands in the PLC; l1: stands in the PLC')
     longest = 2.0 + Network().line_mode.longest_transaction(Network().line, 0.0)
     services.look(line_time() + 2 * longest - 1.0)
-    assert woken == ['link', 'executor']
+    assert len(woken) == 2
     services.look(line_time() + 2 * longest)
     assert ended(puts[0]) == (False, 'unknown whether written: no result has come')
     assert ended(puts[1]) == (False, 'l0: stands in the PLC')

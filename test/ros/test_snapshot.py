@@ -66,6 +66,7 @@ def test_single_value_has_all_that_is_known_of_it() -> None:
     ('N7:10', 2, '', array('h', [1, 2]), ['value N7:10', 'value N7:11']),
     ('B3:0/15', 2, '', array('B', [1, 0]), ['value B3:0/15', 'value lamp']),
     ('N7:0', 2, 'int32', array('i', [1, 2]), ['value N7:0', 'value N7:2']),
+    ('N7:0', 32, '', array('h', range(32)), [f'value N7:{number}' for number in range(32)]),
     ('N7:0', 33, '', array('h', range(33)), ['value']),
     ('ST9:0', 1, '', '', ['value'])])
 def test_each_value_of_an_array_has_a_key(
@@ -87,6 +88,7 @@ def test_value_that_is_not_fresh_says_so(
         values: array | None, age: float, error: str | None, level: bytes, message: str) -> None:
     status = status_of(make_mapping('N7:0'), values, age=age, error=error)
     assert (status.level, status.message) == (level, message)
+    assert details(status).get('age_ms', '0') == f'{1000 * max(age, 0):.0f}'
 
 
 def test_value_within_the_deadband_is_as_new_as_its_age() -> None:

@@ -63,7 +63,8 @@ LEVEL = make_mapping('N7:0', plc='SLC', item=6)
 
 
 @for_all(('identity', 'rows', 'text'), [
-    (PLC5, [LEVEL], 'station 1 is a PLC-5/40, map.csv:7 says SLC'), (SLC, [LEVEL], None),
+    (PLC5, [LEVEL, make_mapping('N7:1', plc='SLC', item=9)],
+     'station 1 is a PLC-5/40, map.csv:7 says SLC'), (SLC, [LEVEL], None),
     (SLC, [LEVEL, make_mapping('N7:0', plc='PLC5', item=2)],
      'station 1 is an SLC 5/03, map.csv:3 says PLC5'),
     (PLC5, [make_mapping('020', plc='PLC2')], None), (Identity(None, '1770-KF2'), [LEVEL], None),
@@ -164,6 +165,9 @@ def test_service_waits_without_holding_up_the_node(desk: Desk) -> None:
 
 
 def test_service_gives_up(desk: Desk) -> None:
+    desk.work({1: b'\1\2', 2: b'\3\4'})
+    assert desk.result()[0]
+    desk.answer = desk.client.call_async(Trigger.Request())
     desk.work({1: b'\1\2'})
     desk.service.check(time.monotonic() + 4.0)
     desk.ticks_pass()

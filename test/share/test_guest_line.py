@@ -328,8 +328,14 @@ def test_looks_for_a_program_are_frequent_and_without_a_wait(
     waits: list[float] = []
     monkeypatch.setattr(select, 'poll', lambda: SimpleNamespace(
         register=lambda *of: None, poll=waits.append))
-    line = guest_line(f'tcp:{OWN_HOST}:{free_port()}')
-    with pytest.raises(NoClient):
-        line.open_port()
-    line.stop()
+    line = guest_line(f'tcp:{OWN_HOST}:{(port := free_port())}')
+
+    def release() -> None:
+        with pytest.raises(NoClient):
+            line.open_port()
+
+    monkeypatch.setattr(line.link, 'release', release)
+    line.pause()  # the thread may look once more until it has released the place
     assert (waits, line.link.retry_period) == ([0], 0.1)
+    socket.create_server((OWN_HOST, port)).close()
+    line.stop()
