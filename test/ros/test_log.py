@@ -70,27 +70,6 @@ def test_every_message_has_the_level_of_its_table(
     assert text.endswith(' [station 2]')
 
 
-def test_details_do_not_make_another_cause(log: EventLog, logged: Logged) -> None:
-    log.add(Event(Message.ERR_WRONG_MESSAGE, (1, 5, 10), 1))
-    log.add(Event(Message.ERR_WRONG_MESSAGE, (1, 5, 11), 1))
-    assert logged() == [
-        ('ERROR', '2510 ERR_WRONG_MESSAGE: Wrong Message Received Src:0x01, Dst:0x05, '
-                  'Tns:0x000a [station 1]')]
-
-
-def test_another_station_or_message_is_another_cause(log: EventLog, logged: Logged) -> None:
-    for _ in range(2):
-        log.add(event(Message.ERR_COMMAND_TIMEOUT, 1))
-        log.add(event(Message.ERR_COMMAND_TIMEOUT, 2))
-        log.add(event(Message.ERR_COMMAND_TIMEOUT, None))
-        log.add(event(Message.ERR_RCVD_NAK_SYMBOL, 1))
-    assert logged() == [
-        ('ERROR', '2508 ERR_COMMAND_TIMEOUT: Command Timed Out [station 1]'),
-        ('ERROR', '2508 ERR_COMMAND_TIMEOUT: Command Timed Out [station 2]'),
-        ('ERROR', '2508 ERR_COMMAND_TIMEOUT: Command Timed Out'),
-        ('ERROR', '2511 ERR_RCVD_NAK_SYMBOL: Received NAK Symbol [station 1]')]
-
-
 def test_cause_is_news_after_a_quiet_minute_and_its_repetitions_are_counted(
         log: EventLog, clock: Clock, logged: Logged) -> None:
     text = '2508 ERR_COMMAND_TIMEOUT: Command Timed Out [station 2]'
@@ -183,13 +162,6 @@ def test_forged_senders_neither_fill_the_memory_nor_the_log(
 @pytest.fixture
 def lines(clock: Clock) -> LimitedLog:
     return LimitedLog(get_logger('log_test'), clock)
-
-
-def test_lines_have_the_level_they_are_given(lines: LimitedLog, logged: Logged) -> None:
-    lines.info('a', 'one')
-    lines.warning('a', 'two')
-    lines.error('a', 'three')
-    assert logged() == [('INFO', 'one'), ('WARN', 'two'), ('ERROR', 'three')]
 
 
 @pytest.mark.parametrize('level', ['info', 'warning', 'error'])

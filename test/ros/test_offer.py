@@ -181,7 +181,8 @@ def test_row_with_other_values_has_a_publisher_that_kept_none(
     topics: Any = ReadTopics
     topics(node, published, ('/dev/a',)).offer({old: point})
     assert node.noted(topics(node, published, ('/dev/a',)).open, {new: point}) == notes
-    assert node.noted(topics(node, published, ('/dev/a', '/dev/other')).open, {new: point}) == ['+a']
+    other = topics(node, published, ('/dev/a', '/dev/b'))
+    assert node.noted(other.open, {new: point}) == ['+a']
 
 
 @pytest.mark.parametrize(('old', 'new', 'is_fit'), [

@@ -118,15 +118,6 @@ def test_rows_come_and_go_and_those_that_stay_are_not_disturbed(bench: Bench) ->
     bench.ros.until(lambda: not node.count_publishers('/abdf1/read/speed'), 'the end of a topic')
 
 
-def test_row_of_another_length_has_values_of_that_length(bench: Bench) -> None:
-    speeds = bench.ros.listen(Int16MultiArray, '/abdf1/read/speed', EVERYTHING)
-    speeds.values([7, 8])
-    bench.write_map(SPEED.removesuffix('2') + '3')
-    assert bench.reload()[0]
-    speeds.values([7, 8, 0])
-    assert speeds[-1].layout.dim[0].size == 3
-
-
 def test_writes_go_to_the_new_map(bench: Bench) -> None:
     results = bench.results
     publisher = bench.ros.publisher(Int16MultiArray, '/abdf1/write/recipe')

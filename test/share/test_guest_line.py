@@ -329,12 +329,7 @@ def test_looks_for_a_program_are_frequent_and_without_a_wait(
     monkeypatch.setattr(select, 'poll', lambda: SimpleNamespace(
         register=lambda *of: None, poll=waits.append))
     line = guest_line(f'tcp:{OWN_HOST}:{(port := free_port())}')
-
-    def release() -> None:
-        with pytest.raises(NoClient):
-            line.open_port()
-
-    monkeypatch.setattr(line.link, 'release', release)
+    monkeypatch.setattr(line.link, 'release', lambda: pytest.raises(NoClient, line.open_port))
     line.pause()  # the thread may look once more until it has released the place
     assert (waits, line.link.retry_period) == ([0], 0.1)
     socket.create_server((OWN_HOST, port)).close()
