@@ -1012,6 +1012,7 @@ def test_rows_whose_messages_fill_the_line_are_named_the_fullest_first() -> None
 
 def test_gateway_of_a_station_is_named(make_bench: Benches) -> None:
     bench = make_bench('speed,Read,N7:0,1,PLC5,1000,8', 'level,Read,N7:0,2,PLC5,1000,',
+                       'all,Write,N7:0,255,PLC5,,',
                        header='Tag,Command,Address,Station,PLC_Type,Period,Via')
     assert bench.details('station 1')['gateway'] == '8'
     assert 'gateway' not in bench.details('station 2')

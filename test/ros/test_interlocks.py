@@ -286,13 +286,14 @@ def test_rule_8_broadcast_of_a_guest_over_a_fallback_is_told_and_written_over(
     for what in ('N10:0 = 1, words of beat', 'N10:1 = 99, words of speed'):
         assert (f'guest pty:{place} has sent to station 255: protected typed logical write '
                 f'{what}') in said
+    assert 'read_only' not in said
 
 
 def test_rule_5_new_files_are_a_new_start(cell: Cell) -> None:
     cell.until_counting()
     cell.map.write_text(MAP[:MAP.index('beat')], encoding='utf-8')
     assert cell.call(Trigger, 'reload', Trigger.Request()).success
-    assert cell.word('N10:0') == 0
+    assert (cell.word('N10:0'), len([*cell.node.timers])) == (0, 1)  # that of the cell
     cell.map.write_text(MAP, encoding='utf-8')
     assert cell.call(Trigger, 'reload', Trigger.Request()).success
     cell.until_counting()

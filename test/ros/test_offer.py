@@ -15,7 +15,6 @@
 """Publishers that a bridge has only while it has the line, and what is left when it is lost."""
 
 from array import array
-from collections import deque
 from collections.abc import Callable
 import math
 from types import SimpleNamespace
@@ -86,14 +85,15 @@ def test_message_that_meets_the_loss_of_the_line_is_no_error(offered: LosingPubl
     topics.publish_later_values()
 
 
-def test_message_that_another_thread_has_taken_is_no_error(offered: LosingPublisher) -> None:
-    class Raced(deque[UInt8]):
-
-        def __bool__(self) -> bool:
-            return True  # as the thread saw it a moment ago
-
-    offered.waiting = Raced()
+def test_last_messages_wait_for_the_line_in_their_order() -> None:
+    sent: list[int] = []
+    node: Any = SimpleNamespace(create_publisher=lambda *_: SimpleNamespace(
+        publish=sent.append, get_subscription_count=lambda: 1))
+    offered = OfferedPublisher(node, UInt8, '~/a', 1, most=2)
+    for number in range(3):
+        offered.publish(number)
     offered.offer()
+    assert (sent, offered.has_subscribers()) == ([1, 2], True)
 
 
 def test_closed_publisher_has_no_subscribers(offered: LosingPublisher) -> None:

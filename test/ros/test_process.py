@@ -14,13 +14,13 @@
 
 """The node as a process: how it starts, ends, finds its port, and takes other names."""
 
-from collections.abc import Iterator
+from contextlib import nullcontext
 import os
 from pathlib import Path
-import re
 import signal
 from typing import cast
 
+from abdf1_ros.ros import node
 from abdf1_ros.ros.bridge.last_writes import LAST_WRITES, take_last_writes
 from abdf1_ros.ros.process import main
 import pytest
@@ -70,19 +70,17 @@ def test_slow_callback_is_no_pause_between_writes() -> None:
     assert writes_taken(*5000 * [(0.01, 1)]) == pytest.approx(100 * LAST_WRITES, abs=1)
 
 
-@pytest.fixture
-def hangups() -> Iterator[None]:
-    """Let processes end with their terminal, also where the tests themselves do not."""
-    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
-    yield
-    signal.signal(signal.SIGHUP, before)
-
-
-@pytest.mark.usefixtures('hangups')
-def test_ends_with_its_terminal(files: Files) -> None:
-    with Process('node', *files.args(), is_forked=False) as node:
-        node.wait_for('cannot open the port')
-        node.end(signal.SIGHUP)
+@pytest.mark.parametrize('handler', [signal.SIG_DFL, signal.SIG_IGN])
+def test_ends_with_its_terminal_but_not_under_nohup(
+        handler: signal.Handlers, monkeypatch: pytest.MonkeyPatch) -> None:
+    taken: list[int] = []
+    monkeypatch.setattr(signal, 'getsignal', {signal.SIGHUP: handler}.get)
+    monkeypatch.setattr(main, 'EndRequest', lambda numbers, begin: nullcontext(
+        taken.extend(numbers)))
+    with pytest.raises(SystemExit):
+        node.main(['node', 'odd argument'])
+    hangups = [signal.SIGHUP] * (handler is signal.SIG_DFL)
+    assert taken == [signal.SIGINT, signal.SIGTERM, *hangups]
 
 
 def test_silent_station_is_told_at_once_and_does_not_delay_the_end(
@@ -111,13 +109,6 @@ def test_silent_station_is_told_at_once_and_does_not_delay_the_end(
 # Starts
 
 
-def fatal(line: str) -> str:
-    """Return the text of a line of the log, which has to be of level FATAL."""
-    match = re.fullmatch(r'\[FATAL\] \[[0-9.]+\] \[abdf1\]: (.+)', line)
-    assert match, line
-    return match[1]
-
-
 def refused_start(*arguments: str, status: int = 2) -> list[str]:
     """Return the lines of a node that does not start; its log is that of no other."""
     with Process('node', *arguments) as node:
@@ -126,10 +117,17 @@ def refused_start(*arguments: str, status: int = 2) -> list[str]:
         return node.lines
 
 
-def test_log_file_has_the_name_that_was_given() -> None:
-    descriptor = main.log_file('abdf1', ['--log-file-name', 'mine', '-p', 'read_only:=true'])
-    assert Path(f'/proc/self/fd/{descriptor}').readlink().name.startswith('mine_')
-    os.close(cast(int, descriptor))
+@pytest.mark.parametrize(('given', 'name'), [
+    (['--log-file-name', 'mine', '-p', 'read_only:=true'], 'mine'), (['--log-file-name'], 'me')])
+def test_log_file_has_the_name_that_was_given(
+        given: list[str], name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for variable in ('ROS_LOG_DIR', 'HOME'):
+        monkeypatch.delenv(variable)
+    monkeypatch.setenv('ROS_HOME', str(tmp_path / 'new'))
+    descriptor = cast(int, main.log_file('me', given))
+    assert Path(f'/proc/self/fd/{descriptor}').readlink().match(f'{tmp_path}/new/log/{name}_*.log')
+    assert os.fstat(descriptor).st_mode & 0o777 == 0o644
+    os.close(descriptor)
 
 
 @pytest.mark.parametrize('directory', ['/proc/none', '/proc'])
@@ -145,8 +143,9 @@ def test_user_without_a_home_is_told_what_to_set(monkeypatch: pytest.MonkeyPatch
     for name in ('ROS_LOG_DIR', 'HOME'):
         monkeypatch.delenv(name)
     (line,) = refused_start()
-    assert fatal(line) == ('environment: HOME is not set, so there is no directory for the log; '
-                           'set ROS_LOG_DIR to a directory that this user may write to')
+    assert line.startswith('[FATAL]')
+    assert line.endswith('] [abdf1]: environment: HOME is not set, so there is no directory for '
+                         'the log; set ROS_LOG_DIR to a directory that this user may write to')
 
 
 def test_trace_that_cannot_be_written_is_an_error_and_no_stop(

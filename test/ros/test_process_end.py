@@ -98,6 +98,7 @@ HANGS = {'held': 'ctypes.PyDLL(None).sleep(60)', 'slow': 'time.sleep(60)'}
 
 
 @pytest.mark.parametrize(('name', 'where', 'how', 'limit', 'status'), [
+    ('node', '__init__', 'slow', 'usual', 0),  # no port is open yet
     ('node', 'destroy_node', 'slow', 'early', 0),  # PLCs and writes are done
     ('node', 'destroy_node', 'held', 'soon', 1),  # with the interpreter lock: no code of ours runs
     pytest.param('node', 'check', 'slow', 'usual', 1, marks=pytest.mark.long),
@@ -105,10 +106,10 @@ HANGS = {'held': 'ctypes.PyDLL(None).sleep(60)', 'slow': 'time.sleep(60)'}
 def test_clock_ends_what_does_not_come_back(
         tmp_path: Path, name: str, where: str, how: str, limit: str, status: int) -> None:
     patch = (f'{LIMITS[limit]}from abdf1_ros.ros.bridge.node import BridgeNode\n'
-             f'def hang(self, *arguments): print("hangs", flush=True); {HANGS[how]}\n'
+             f'def hang(self, *arguments, **named): print("hangs", flush=True); {HANGS[how]}\n'
              f'BridgeNode.{where} = hang')
     with program(tmp_path, name, patch) as process:
-        process.wait_for('hangs' if where == 'check' else RUNS[name])
+        process.wait_for(RUNS[name] if where == 'destroy_node' else 'hangs')
         process.send(signal.SIGTERM)
         assert process.result() == status, process.text  # it hangs for longer than this waits
         assert ('in hang' in process.text) is bool(status)  # it says where

@@ -30,14 +30,13 @@ from abdf1_ros.ros.bridge.guests import GuestPlaces
 from abdf1_ros.ros.bridge.reload import changes, refuse_harm
 from abdf1_ros.ros.bridge.session import BridgeSession
 from abdf1_ros.ros.diagnostics.line import LineView
-from abdf1_ros.ros.parameters.declared import Configuration, Parameters, read_again
+from abdf1_ros.ros.parameters.declared import Configuration, Parameters
 from abdf1_ros.ros.parameters.file_watch import FileWatch
 from abdf1_ros.ros.parameters.shown import ShownFiles
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.rows import Rows
 import pytest
 from rcl_interfaces.srv import GetParameters
-from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 from std_msgs.msg import Float32MultiArray, Int16MultiArray, String, UInt16MultiArray
@@ -155,13 +154,14 @@ def test_row_of_another_message_type_or_address_has_a_new_topic(bench: Bench) ->
 
 
 def test_faulty_files_change_nothing(bench: Bench, capfd: Output) -> None:
-    bench.write_map(LEVEL, 'speed,Read,N7:0,1,PLC5,none')  # one row is enough
+    bench.write_map(LEVEL, *30 * ['speed,Read,N7:0,1,PLC5,none'])  # one row is enough
     bench.write_net(100, 9601)
     driver = bench.node.session.driver
     success, message = bench.reload()
     assert not success
     assert message.startswith(f'goes on as before: {bench.net}:2:1 (Baud): Baud = "9601" should')
     assert f'; {bench.map}:3:6 (Length): ' in message
+    assert message.count(f'; {bench.map}:') == 19
     assert bench.node.session.driver is driver
     assert bench.parameter('net.baud') == 115200
     assert bench.parameter('map.recipe.address') == 'N7:4'
@@ -221,9 +221,15 @@ def test_files_that_cannot_be_taken_leave_topics_and_services_to_the_old_driver(
     node.create_publisher(String, '~/read/level', 1)  # DDS allows one type for a topic
     publishers = [*node.publishers]
     bench.write_map(SPEED, 'more,Read,N7:8,1,PLC5,3', LEVEL)
-    with pytest.raises(rclpy_implementation.RCLError):
-        node.hand_over(read_again(node.session.configuration))
-    assert [*node.publishers] == publishers
+    write_csv(bench.net, 'Baud,Timeout,Share', ['115200,100,tcp:4501'])
+    assert bench.polling(False)[0]
+    assert bench.reload()[1].startswith('refused: RCLError')
+    assert ([*node.publishers], node.link.is_released) == (publishers, True)
+    bench.port_owners.hold('/other', 'tcp:4501')
+    bench.polling(True)
+    assert bench.reload()[1].startswith('goes on as before: port: tcp:4501 is the place of /other')
+    bench.port_owners.hold('/other')
+    assert not bench.reload()[0]
     bench.ros.until(lambda: node.session.driver.is_online, 'the port')
     assert bench.call(Trigger, 'read_now/speed', Trigger.Request()).success
     bench.ros.until(publisher.get_subscription_count, 'its topic')
@@ -498,9 +504,10 @@ def test_changes_are_named() -> None:
     before = configured(ROW, make_mapping('N7:9', tag='gone'))
     assert changes(before, before) == 'nothing has changed'
     after = configured(make_mapping('N7:1', tag='speed'), make_mapping('N7:2', tag='new'),
-                       port='/dev/ttyS1', baud=19200, com_port='2', share='pty:/tmp/hmi')
+                       port='/dev/ttyS1', baud=19200, com_port='2', share='pty:/tmp/hmi',
+                       timeout=0)
     assert changes(before, after) == (
-        'port /dev/ttyS1 (was /dev/ttyS0); Baud 19200 (was 9600); Share pty:/tmp/hmi (was '
-        'empty); new: new; gone: gone; changed: speed')
+        'port /dev/ttyS1 (was /dev/ttyS0); Baud 19200 (was 9600); Timeout 0 (was '
+        '1000); Share pty:/tmp/hmi (was empty); new: new; gone: gone; changed: speed')
     moved = configured(replace(ROW, item=7))
     assert changes(configured(ROW), moved) == 'nothing has changed', 'its line in the file'

@@ -214,6 +214,7 @@ def test_line_of_a_device_server_is_ours_when_any_station_has_answered_since_it_
         session.reads.latest['speed'] = [1]
     tables = around.active_stations.publish.call_args_list
     assert [call.args[0].data[0] for call in tables] == [6, 7, 0, 7]  # none without a port
+    assert around.active_words == [7]
     assert events.port_changed.call_count == 3  # late replies are no errors
     assert [*map(str, events.notes.mock_calls)] == [
         f"call.{level}('the port', '{port}: {is_open}')"

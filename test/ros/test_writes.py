@@ -157,7 +157,8 @@ def test_messages_wait_in_their_order_until_the_node_has_begun(
                          'b 4', "b: ['/panel_b'] ahead by 1.5 s",
                          'b 5: its time stamp is 2.6 s ahead of the clock here, write_timeout is '
                          '2 s; the clocks differ, so its age is unknown']
-    assert (topics.taken, node.wakes) == (8, [2, 4, 5, 6, 8])
+    assert (topics.taken, node.wakes, topics.host_clock.offsets.seconds) == (
+        8, [2, 4, 5, 6, 8], 2.0)
     assert node.requests == node.stamps
 
 
