@@ -71,5 +71,5 @@ def scope_of(context: Any) -> Callable[[Any], None]:
         for current, values in zip((later.launch_configurations, later.environment), now,
                                    strict=True):
             current.clear()
-            current.update(values)
+            current.update(deepcopy(values))  # a later action may append to a list of it
     return restore

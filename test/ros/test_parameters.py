@@ -17,12 +17,13 @@
 from collections.abc import Callable, Iterator
 import math
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 from abdf1_ros.df1.settings import PollingSettings
 from abdf1_ros.paths import config_file
 from abdf1_ros.problems import ConfigurationError
-from abdf1_ros.ros.launching import descriptions, parameter_types, unknown_arguments
+from abdf1_ros.ros.launching import descriptions, parameter_types, scope_of, unknown_arguments
 from abdf1_ros.ros.parameters.arguments import Arguments, is_for
 from abdf1_ros.ros.parameters.declared import Configuration, configure, Parameters
 from abdf1_ros.ros.parameters.files import parameter_tree
@@ -171,13 +172,6 @@ def test_what_the_files_say_is_shown_and_nobody_else_sets_it(
         assert not result.successful and '~/reload' in result.reason
     assert node.describe_parameter('map.line.door.plc_type').description == \
         next(column.description for column in MAP_COLUMNS if column.name == 'PLC_Type')
-
-
-def test_net_file_and_its_overrides(configured: Configured) -> None:
-    network = configured().network
-    assert network == Network(baud=9600, com_port='3')
-    network = configured(**{'net.baud': 19200, 'net.timeout': 0}).network
-    assert network == Network(baud=19200, com_port='3', timeout=0)
 
 
 @pytest.mark.parametrize(('name', 'value', 'field', 'expected'), [
@@ -519,6 +513,17 @@ def test_unknown_arguments_are_told_with_what_would_be_right(command: list[str])
 
 def test_arguments_of_a_file_that_includes_this_one_are_its_own() -> None:
     assert not unknown_arguments(FILE, [], ['ros2', 'launch', 'cell', 'cell.launch.py', 'x:=1'])
+
+
+def test_restart_has_the_scope_of_the_first_start() -> None:
+    context = SimpleNamespace(launch_configurations={'ns': ['a']}, environment={'A': '1'})
+    restore = scope_of(context)
+    for _ in range(2):
+        context.launch_configurations['ns'].append('b')
+        context.environment |= {'A': '2', 'B': '3'}
+        restore(context)
+        assert vars(context) == {
+            'launch_configurations': {'ns': ['a']}, 'environment': {'A': '1'}}
 
 
 def test_every_parameter_has_a_type_and_a_description() -> None:
