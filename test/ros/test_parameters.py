@@ -177,7 +177,6 @@ def test_what_the_files_say_is_shown_and_nobody_else_sets_it(
 @pytest.mark.parametrize(('name', 'value', 'field', 'expected'), [
     ('net.handshake', True, 'handshake', True),  # YAML makes that of Yes
     ('net.handshake', False, 'handshake', False),
-    ('net.com_port', 2, 'com_port', '2'),
     ('net.station', '7', 'station', 7)])
 def test_link_parameters_are_read_as_the_file_is(
         configured: Configured, name: str, value: Any, field: str, expected: Any) -> None:
