@@ -35,6 +35,7 @@ from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.guests import Guest
 from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackState
 from abdf1_ros.driver.interlocks.heartbeat import BeatState
+from abdf1_ros.driver.overheard import Carried
 from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.driver.record import Claim
 from abdf1_ros.driver.settings import DriverSettings
@@ -480,6 +481,16 @@ def test_link_tells_how_far_behind_each_period_is(bench: Bench) -> None:
     assert periods() == {}  # neither what the PLC writes nor what is asked for has our pace
 
 
+def test_latest_reads_of_other_nodes_are_shown_by_station(make_bench: Benches) -> None:
+    overheard = (bench := make_bench(mode='Listen')).driver.overheard
+    assert overheard is not None
+    overheard.carried = {(n % 2, f'{n}'): Carried(
+        n % 2, f'N{n:02}', Packet(5, 1, 6, 0, 7), 0.0, NOW - n, n) for n in range(31)}
+    heard = [pair for pair in bench.details('link').items() if pair[0].startswith('heard')]
+    assert heard == [(f'heard of station {n % 2}: N{n:02}', f'{n} times, last {n}.0 s ago')
+                     for n in (*range(0, 30, 2), *range(1, 30, 2))]
+
+
 # counters
 
 
@@ -681,14 +692,6 @@ def test_rows_that_cannot_keep_their_period_are_named_with_one_that_would_do(
         'ERROR: of 5 mappings 1 failed, 4 fresh; Period not kept: fast (Period 100 ms, kept '
         '141 ms); the line can keep Period 200'))
     assert 'Period' not in bench.says('mappings', NOW + 95)[1]  # no row is read any more
-
-
-def test_single_long_interval_is_no_load(bench: Bench) -> None:
-    speed = bench.point('speed')
-    for when in (0, 1, 2, 300, 301, 302):
-        speed.update(b'\x01\x00', NOW + when)
-    bench.point('level').update(bytes(4), NOW + 302)
-    assert bench.says('mappings', NOW + 302) == (OK, 'OK: of 2 mappings 2 fresh')
 
 
 def test_failed_mapping_is_named_with_the_reason(bench: Bench) -> None:
