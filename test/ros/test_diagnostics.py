@@ -283,8 +283,9 @@ def test_link_is_as_good_as_its_stations(bench: Bench) -> None:
 
 
 def test_line_without_a_station_is_well(make_bench: Benches) -> None:
-    assert make_bench('all,Write,N7:0,255,PLC5,').says('link') == (
-        OK, 'OK: port open, 0 of 0 stations have answered')
+    bench = make_bench('all,Write,N7:0,255,PLC5,')
+    assert bench.says('link') == (OK, 'OK: port open, 0 of 0 stations have answered')
+    assert bench.says('mappings') == (OK, 'OK: no mapping reads')
 
 
 def test_station_that_takes_commands_and_never_replies_is_told(bench: Bench) -> None:
@@ -723,10 +724,6 @@ def test_tag_does_not_stand_in_for_a_count(make_bench: Benches) -> None:
     assert values['tag total'] == 'waiting for the first read: N7:0 at station 1, never read'
 
 
-def test_map_without_reads_is_ok(make_bench: Benches) -> None:
-    assert make_bench(ROWS[2]).says('mappings') == (OK, 'OK: no mapping reads')
-
-
 def test_blocks_may_be_divided_while_the_poll_cycle_is_asked_for(bench: Bench) -> None:
     # That is what the link thread does when a PLC refuses an address.
     jobs: Any = bench.driver.readings.reads.queue.jobs
@@ -783,8 +780,11 @@ def test_every_outcome_is_counted_in_its_place(
         Outcome.WRITTEN, Outcome.STANDS, Outcome.BROADCAST, Outcome.SUPERSEDED)
     assert last == (f'level {outcome.value}: why (1.0 s ago)' if is_failure else 'none')
     level, text = log.judge(NOW)
-    assert (level, text[0]) == (
-        WARN if is_failure else OK, '01'[outcome in (Outcome.WRITTEN, Outcome.STANDS)])
+    is_good = outcome in (Outcome.WRITTEN, Outcome.STANDS)
+    assert (level, text[0]) == (WARN if is_failure else OK, '01'[is_good])
+    bench.written(result(bench, outcome))
+    assert bench.results[0].level == (
+        OK if is_good else WARN if not is_failure or outcome is Outcome.FALLBACK else ERROR)
 
 
 @pytest.mark.parametrize(('cause', 'level'), [

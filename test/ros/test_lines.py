@@ -143,7 +143,8 @@ def test_temporary_folder_is_asked_for_only_where_a_name_is_left_out(
         raise FileNotFoundError('no usable temporary directory')
 
     monkeypatch.setattr(files, 'TemporaryDirectory', refuse)
-    good = ['--params-file', yaml_file(tmp_path, 'a: {ros__parameters: {port: x}}')]
+    good = ['--params-file', yaml_file(
+        tmp_path, 'a: {ros__parameters: [!!str x, !!bool on, !!int 1, !!float 2, !!null ~]}')]
     with usable_files(good, leaves_out=True) as given:
         assert given == good
     bad = yaml_file(tmp_path, 'a-b: {ros__parameters: {port: x}}')
@@ -300,7 +301,7 @@ def test_each_line_is_a_node_of_its_own(plant: Plant, capfd: Output) -> None:
         plant.plcs['b'].port, 3.5]
     diagnostics = plant.observer.diagnostics(plant.plcs['c'].port)
     assert until_status(diagnostics, 'link', OK).name == 'hall/c: link'
-    assert line_status(plant, OK)['running'] == '3'
+    assert line_status(plant, OK) == {'lines': '3', 'running': '3', 'restarts': '0'}
     assert plant.observer.call(Trigger, '/hall/a/reload', Trigger.Request()).success
     assert plant.end() == 0
 
@@ -319,7 +320,8 @@ def test_second_process_of_the_same_name_is_a_warning(plant: Plant, capfd: Outpu
     shown = plant.observer.diagnostics('')
     other = Node('lines', context=plant.observer.context)
     try:
-        until_status(shown, 'lines', ERROR, lambda status: text in status.message)
+        until_status(shown, 'lines', ERROR, lambda status: status.message.startswith(
+            f'ERROR: 1 of 2 lines do not run; {text}'))
         plant.write_net('b', plant.plcs['b'].port)
         plant.observer.call(Trigger, '/lines/reload', Trigger.Request())
         status = until_status(shown, 'lines', WARN)

@@ -33,7 +33,6 @@ from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.ports.link_thread import PortState
 from abdf1_ros.ros.bridge.node import end_together
 from abdf1_ros.ros.diagnostics import graph
-from abdf1_ros.ros.node import main
 from diagnostic_msgs.msg import DiagnosticStatus
 import pytest
 from rcl_interfaces.msg import Parameter, ParameterValue
@@ -403,15 +402,6 @@ def test_node_whose_name_cannot_be_read_keeps_no_message_back(
     bench.until_results(1)
     assert bench.words('N7:4', 2) == [5, 6]
     assert 'a periodic check has failed, all else goes on: UnicodeDe' in capfd.readouterr().err
-
-
-@pytest.mark.parametrize('arguments', [
-    ['net.csv'], ['net.csv', 'map.csv'], ['-p', 'net_file:=net.csv']])
-def test_argument_outside_of_ros_arguments(arguments: list[str], capsys: Output) -> None:
-    with pytest.raises(SystemExit) as ending:
-        main(['node', *arguments])
-    assert ending.value.code == 2
-    assert 'write parameters after --ros-args' in capsys.readouterr().err
 
 
 def test_third_internal_error_ends_the_node_with_status_1(

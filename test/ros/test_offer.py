@@ -171,6 +171,7 @@ def test_values_of_a_line_that_was_lost_do_not_come_when_it_is_back() -> None:
 @for_all(('changed', 'notes'), [
     ({'period': 990, 'description': 'x', 'command': 'ReadWrite'}, []), ({'station': 2}, ['+a']),
     ({'via': 2}, ['+a']), ({'length': 2}, ['+a']), ({'scaling': Scaling(0.1)}, ['+a']),
+    ({'access': 'WordRange'}, ['+a']), ({'command': 'Serve'}, ['+a']),
     ({'word_order': 'High'}, ['+a']), ({'condition': While(('RUN',))}, ['+a'])])
 def test_row_with_other_values_has_a_publisher_that_kept_none(
         changed: dict[str, Any], notes: list[str]) -> None:

@@ -220,8 +220,9 @@ def test_parameters_tell_how_stations_are_polled(
 
 
 def test_poll_list_without_standard_polling_is_told(configured: Configured) -> None:
-    given = {'poll_list': '1-2', 'poll_multiple': True, 'poll_group_size': 0}
-    assert configured(**given).idle == ['poll_list', 'poll_multiple']
+    given = {'poll_list': '1-2', 'priority_poll_list': '1', 'poll_group_size': 1,
+             'poll_multiple': True, 'send_in_sequence': True}
+    assert configured(**given).idle == [*given]
     assert configured(**given | {'net.polling': 'Standard'}).idle == []
 
 
@@ -459,7 +460,8 @@ def test_section_that_would_be_passed_over_is_an_error(
 
 @pytest.mark.parametrize('sections', [
     ['parameters read_only: true', 'abdf1 read_only: false'],
-    ['"/**" read_only: true', 'camera port: /dev/ttyUSB3, write_timeout: 3'],
+    ['"/**" read_only: true', 'camera port: /dev/ttyUSB3, write_timeout: 3, lines: 1, '
+     'rs485: true, low_latency: true, diagnostics_period: 2'],
     ['"/*" gain: 1', 'camera gain: 3'], ['camera port: /dev/ttyUSB3'],
     ['parameters ', 'x/parameters read_only: true']])
 def test_sections_of_other_nodes_are_none_of_our_business(
@@ -508,9 +510,7 @@ def test_unknown_arguments_are_told_with_what_would_be_right(command: list[str])
     assert unknown_arguments(FILE, ['port', 'map_file'], given) == [
         'mapfile: there is no such argument; did you mean map_file?',
         'a: there is no such argument; --show-args lists them']
-
-
-def test_arguments_of_a_file_that_includes_this_one_are_its_own() -> None:
+    # a file that includes this one has arguments of its own
     assert not unknown_arguments(FILE, [], ['ros2', 'launch', 'cell', 'cell.launch.py', 'x:=1'])
 
 

@@ -72,13 +72,15 @@ def test_slow_callback_is_no_pause_between_writes() -> None:
 
 @pytest.mark.parametrize('handler', [signal.SIG_DFL, signal.SIG_IGN])
 def test_ends_with_its_terminal_but_not_under_nohup(
-        handler: signal.Handlers, monkeypatch: pytest.MonkeyPatch) -> None:
+        handler: signal.Handlers, monkeypatch: pytest.MonkeyPatch,
+        capsys: pytest.CaptureFixture[str]) -> None:
     taken: list[int] = []
     monkeypatch.setattr(signal, 'getsignal', {signal.SIGHUP: handler}.get)
     monkeypatch.setattr(main, 'EndRequest', lambda numbers, begin: nullcontext(
         taken.extend(numbers)))
-    with pytest.raises(SystemExit):
-        node.main(['node', 'odd argument'])
+    with pytest.raises(SystemExit, match='2'):
+        node.main(['node', '-p', 'net_file:=net.csv'])
+    assert 'unknown argument; write parameters after --ros-args' in capsys.readouterr().err
     hangups = [signal.SIGHUP] * (handler is signal.SIG_DFL)
     assert taken == [signal.SIGINT, signal.SIGTERM, *hangups]
 
