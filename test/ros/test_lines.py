@@ -316,20 +316,20 @@ def test_process_has_a_name_of_its_own(plant: Plant) -> None:
 def test_second_process_of_the_same_name_is_a_warning(plant: Plant, capfd: Output) -> None:
     text = 'another node is called /lines too'
     (plant.folder / 'b_net.csv').write_text('Baud\n9601\n')
-    plant.start('-p', 'lines:=[a, b]', reads='a')
+    plant.start(reads='a')
     shown = plant.observer.diagnostics('')
     other = Node('lines', context=plant.observer.context)
     try:
         until_status(shown, 'lines', ERROR, lambda status: status.message.startswith(
-            f'ERROR: 1 of 2 lines do not run; {text}'))
+            f'ERROR: 1 of 3 lines do not run; {text}'))
         plant.write_net('b', plant.plcs['b'].port)
         plant.observer.call(Trigger, '/lines/reload', Trigger.Request())
         status = until_status(shown, 'lines', WARN)
     finally:
         other.destroy_node()
-    assert status.message.startswith(f'WARN: 2 of 2 lines run; {text}')
+    assert status.message.startswith(f'WARN: 3 of 3 lines run; {text}')
     logged = capfd.readouterr().err
-    assert '1 of 2 lines run' in logged and text in logged
+    assert '2 of 3 lines run' in logged and text in logged
 
 
 def test_process_may_open_as_many_files_as_the_system_allows(

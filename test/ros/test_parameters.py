@@ -460,7 +460,7 @@ def test_section_that_would_be_passed_over_is_an_error(
 
 @pytest.mark.parametrize('sections', [
     ['parameters read_only: true', 'abdf1 read_only: false'],
-    ['"/**" read_only: true', 'camera port: /dev/ttyUSB3, write_timeout: 3, lines: 1, '
+    ['"/**" read_only: true', 'camera port: /dev/ttyUSB3, write_timeout: 3, '
      'rs485: true, low_latency: true, diagnostics_period: 2'],
     ['"/*" gain: 1', 'camera gain: 3'], ['camera port: /dev/ttyUSB3'],
     ['parameters ', 'x/parameters read_only: true']])
