@@ -31,7 +31,7 @@ from abdf1_ros.ros.bridge.node import BridgeNode
 from abdf1_ros.ros.bridge.port_owners import PortOwners
 from abdf1_ros.ros.lines import chosen, main, RestartedLine, sections, start_one
 from abdf1_ros.ros.parameters import files
-from abdf1_ros.ros.parameters.files import parameter_files, usable_files
+from abdf1_ros.ros.parameters.files import usable_files
 from abdf1_ros.ros.process import main as process
 from abdf1_ros.signals import EndRequest
 from abdf1_ros.testing import Plcs
@@ -61,7 +61,7 @@ PRESS, PAINT = '/press/press_plc', '/paint/paint_plc'
 
 def yaml_file(folder: Path, text: str) -> str:
     path = folder / 'lines.yaml'
-    path.write_text(text)
+    path.write_text(text, 'latin-1')
     return str(path)
 
 
@@ -91,7 +91,7 @@ def test_two_sections_of_one_name_are_a_fault(tmp_path: Path) -> None:
         'of its own')
 
 
-@pytest.mark.parametrize('text', [None, '{', '\x00', '5'])
+@pytest.mark.parametrize('text', [None, '{', '\x00', '\xff', '5'])
 def test_parameter_file_that_cannot_be_read(tmp_path: Path, text: str | None) -> None:
     path = str(tmp_path / 'nothing') if text is None else yaml_file(tmp_path, text)
     with pytest.raises(ConfigurationError, match=path):
@@ -130,7 +130,7 @@ def test_what_is_left_out_changes_nothing_else(tmp_path: Path) -> None:
     kept = "  a:\n    ros__parameters: {day: 2001-99-99, no-1: 010, text: '5', list: [1, 2]}\n"
     path = yaml_file(tmp_path, (
         f'hall/press-plc:\n  ros__parameters: {{}}\nhall:\n  b-1: {{c: {{}}}}\n{kept}'))
-    given = ['--params-file', '/nowhere', '--params-file', path, '-p', 'x:=1']
+    given = ['--params-file', '/nowhere', '--params-file', path, '-p', '--params-file']
     with usable_files(given, leaves_out=True) as (*first, usable, option, value):
         assert [*first, path, option, value] == given
         assert Path(usable).read_text('utf-8') == f'hall:\n{kept}'
@@ -151,11 +151,6 @@ def test_temporary_folder_is_asked_for_only_where_a_name_is_left_out(
     with pytest.raises(ConfigurationError, match='"a-b" cannot name a node'), \
             usable_files(['--params-file', bad], leaves_out=True):
         pass
-
-
-def test_parameter_files_of_the_arguments() -> None:
-    assert parameter_files(['lines', '--ros-args', '--params-file', 'a', '-p', 'x:=1',
-                            '--params-file', 'b', '--params-file']) == ['a', 'b']
 
 
 def test_lines_are_chosen_by_name() -> None:

@@ -221,7 +221,7 @@ def test_parameters_tell_how_stations_are_polled(
 
 def test_poll_list_without_standard_polling_is_told(configured: Configured) -> None:
     given = {'poll_list': '1-2', 'priority_poll_list': '1', 'poll_group_size': 1,
-             'poll_multiple': True, 'send_in_sequence': True}
+             'poll_multiple': True}
     assert configured(**given).idle == [*given]
     assert configured(**given | {'net.polling': 'Standard'}).idle == []
 
@@ -507,7 +507,7 @@ FILE = '/ws/share/abdf1_ros/launch/bridge.launch.py'
     ['ros2', 'launch', 'abdf1_ros', 'bridge.launch.py'], ['ros2', 'launch', './bridge.launch.py']])
 def test_unknown_arguments_are_told_with_what_would_be_right(command: list[str]) -> None:
     given = [*command, 'port:=/dev/x', 'mapfile:=map.csv', 'a:=b:=c']
-    assert unknown_arguments(FILE, ['port', 'map_file'], given) == [
+    assert unknown_arguments(FILE, iter(['port', 'map_file']), given) == [
         'mapfile: there is no such argument; did you mean map_file?',
         'a: there is no such argument; --show-args lists them']
     # a file that includes this one has arguments of its own
@@ -529,6 +529,6 @@ def test_every_parameter_has_a_type_and_a_description() -> None:
     assert parameter_types()['read_only'] is bool
     assert parameter_types()['stale_after'] is float
     assert parameter_types()['default_period'] is int
-    assert [descriptions()[name].rpartition(': ')[2] for name in ('stale_after', 'read_only')] == [
-        '3.0', 'False']
+    assert [descriptions()[name] for name in ('read_only', 'net_file')] == [
+        'refuse every write; default: False', 'path of the net CSV, needed']
     assert descriptions().keys() == parameter_types().keys()

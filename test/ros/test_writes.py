@@ -63,12 +63,13 @@ class Taker:
         self.kinds: dict[str, type] = {}
         self.wakes: list[int] = []
 
-    def create_subscription(self, kind: Any, name: str, callback: Any, qos: Any) -> None:
+    def create_subscription(self, kind: Any, name: str, callback: Any, qos: Any) -> str:
         topic = name.rpartition('/')[2]
         self.callbacks[topic], self.kinds[topic] = callback, kind
+        return topic
 
-    def destroy_subscription(self, subscription: object) -> None:
-        """Take a topic away."""
+    def destroy_subscription(self, subscription: str) -> None:
+        self.said.append(f'-{subscription}')
 
     def count_publishers(self, name: str) -> int:
         return 1
@@ -198,7 +199,7 @@ def test_messages_go_to_the_old_driver_until_the_new_one_has_the_line(
     node.publish('a', 1)
     topics.give_to(opened)
     node.publish('a', 2)
-    assert (node.said, new.said) == (['a 1'], ['a 2'])
+    assert (node.said, new.said) == (['-b', 'a 1'], ['a 2'])
 
 
 def test_message_that_waits_for_rows_which_a_reload_takes_away_or_that_fails_ends_nothing(
@@ -210,20 +211,21 @@ def test_message_that_waits_for_rows_which_a_reload_takes_away_or_that_fails_end
     topics.give_to(node.open(topics))
     topics.begin()
     node.tasks[0]()
-    assert node.said == ['a message on ~/write/b', 'b 1']
+    assert node.said == ['-a', 'a message on ~/write/b', 'b 1']
     for before in 9.0, 0.0:
         topics.host_clock.look(line_time() - before, 0.0)
     node.publish('c', 1)
-    assert node.said[2].startswith('c 1: it came 9.0 s after it was published')
+    assert node.said[3].startswith('c 1: it came 9.0 s after it was published')
 
 
 def test_message_that_waits_when_the_line_is_lost_is_never_written(
         node: Taker, topics: WriteTopics) -> None:
     node.publish('a', 1)
-    topics.withdraw()
+    for _ in range(2):
+        topics.withdraw()
     topics.begin()
     node.tasks[0]()
-    assert node.said == []
+    assert node.said == ['-a', '-b']
 
 
 def test_row_of_another_message_type_has_another_subscription(
