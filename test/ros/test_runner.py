@@ -221,6 +221,10 @@ def test_executor_is_shut_down_when_its_thread_has_ended(monkeypatch: pytest.Mon
         monkeypatch.setattr(SingleThreadedExecutor, 'shutdown',
                             lambda executor, **options: ended.append(not callbacks.is_alive()))
         callbacks.start()
+        with monkeypatch.context() as patch:
+            patch.setattr(callbacks, 'is_alive', lambda: True)  # as a callback hangs
+            callbacks.end(0.0)
+        assert ended == []
         callbacks.end(time.monotonic() + PATIENCE)
         assert ended == [True]
         monkeypatch.undo()

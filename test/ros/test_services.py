@@ -370,12 +370,10 @@ def test_services_of_rows_that_are_gone_close_once_when_no_call_waits() -> None:
         for row in lamps[:count]:
             services.take(WriteResult(row, Outcome.STANDS, '', '', request=[*services.calls][-1]))
     assert woken == ['link', [False, False, False, True]]
-    assert node.messages[1] == {'source_timestamp': 1, 'received_timestamp': 2,
-                                'publication_sequence_number': None}
+    assert [*node.messages[1].values()] == [1, 2, None]
     assert ended(puts[2]) == (True, 'l0: stands in the PLC; l1: stands in the PLC')
     longest = 2.0 + Network().line_mode.longest_transaction(Network().line, 0.0)
     services.look(line_time() + 2 * longest - 1.0)
-    assert len(woken) == 2
     services.look(line_time() + 2 * longest)
     assert ended(puts[0]) == (False, 'unknown whether written: no result has come')
     assert ended(puts[1]) == (False, 'l0: stands in the PLC')
