@@ -153,10 +153,6 @@ class Ladder:
             self._scan(self._next_scan)
             self._next_scan += self.scan_time
 
-    def stand_still(self) -> None:
-        """Make no scans until ``enter_run``."""
-        self._next_scan = None
-
     def _scan(self, now: float) -> None:
         self._show_first_pass()
         before, heartbeat = self.get(11, 1), self.get(10, 0)

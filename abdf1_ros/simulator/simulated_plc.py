@@ -210,7 +210,7 @@ class SimulatedPlc(TaskSource):
         is_poll = isinstance(symbol, Poll) and symbol.valid and symbol.station == self.station
         with self.lock:
             if is_poll and (self._polls_to_refuse > 0 or self.clock() < self._ready):
-                self._polls_to_refuse = max(0, self._polls_to_refuse - 1)
+                self._polls_to_refuse -= 1
                 return self.damaged(frames.EOT)
             return self.damaged(self.slave.handle(symbol))
 
@@ -254,12 +254,8 @@ class SimulatedPlc(TaskSource):
         now = self.clock()
         for mover in self._movers:
             mover.next_time = max(mover.next_time, now)
-        if self.ladder is None:
-            return
-        if self.is_running:
+        if self.ladder is not None and self.is_running:
             self.ladder.enter_run(now)
-        else:
-            self.ladder.stand_still()
 
     def advance(self) -> None:
         """Make all changes that are due by now, while the program runs."""

@@ -121,9 +121,11 @@ def test_silence_is_lost_after_the_preset(kind: type[Ladder], preset: int) -> No
 def test_program_and_run_again_ends_tripped(kind: type[Ladder]) -> None:
     program = Program(kind)
     program.take_control()
-    program.ladder.stand_still()
+    program.ladder.press_reset()
     program.ladder.enter_run(program.now)
     assert (program.dropped(), program.get('B12:0')) == (program.now, 0)
+    program.ladder.advance(program.now)
+    assert [program.get(text) for text in ('B12:0', 'T13:0.ACC', 'T13:2.ACC')] == [0, 0, 0]
     program.run(6.0)
     assert not program.ladder.is_on(Lamp.IN_CONTROL)
 
@@ -183,6 +185,8 @@ def test_what_stands_for_less_than_a_scan_is_not_seen(kind: type[Ladder]) -> Non
         program.put('N10:0', 1)
         program.ladder.advance(program.now + 1.0)
         assert program.ladder.is_on(Lamp.IN_CONTROL) is not is_seen
+    program.ladder.advance(program.now + 500.0)
+    assert 200 < program.get('N11:3') < 300  # of the last minute only
 
 
 def test_page_and_simulator_are_the_same_program() -> None:
@@ -214,7 +218,7 @@ def test_page_and_simulator_are_the_same_program() -> None:
             assert words[0] == words[1], (seed, now)
             seen |= {number for number in range(6) if words[0][5] >> number & 1}
         assert pair[0].lamps == pair[1].lamps
-        assert seen == set(range(6))
+        assert seen == {lamp for _, lamp, _ in pair[0].lamps} == set(Lamp)
 
 
 def test_a_rung_that_cannot_be_read_is_refused() -> None:

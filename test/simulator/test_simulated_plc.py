@@ -110,15 +110,15 @@ class Master:
 
 
 def test_data_file_fills_the_tables_of_its_plcs(path: Path, clock: Clock) -> None:
-    one, two = load(path, clock, '1,PLC5,N7:0,3,1 -2 3,,', '1,PLC5,B3:0/4,3,1 0 1,,',
-                    '1,PLC5,F8:1,1,1.5,,', '1,plc5,ST9:0,1,Hi,,', '2,SLC,L10:1,1,70000,,',
-                    '2,slc,I:1.0,2,5,,')
+    one, two = load(path, clock, '1,PLC5,N7:0-2,3,1 -2 3,,', '1,PLC5,B3:0/4,3,1 0 1,,',
+                    '1,PLC5,F8:1,1,1.5,,', '1,plc5,ST9:0,1,Hi,,', '2,SLC,L10:255,1,70000,,',
+                    '2,MicroLogix,I:1.0,2,5,,')
     assert (one.station, two.station) == (1, 2)
     assert stored(one, 'N7:0', 3) == b'\1\0\xfe\xff\3\0'
     assert stored(one, 'B3:0') == b'\x50\0'
     assert stored(one, 'F8:0', 4) == bytes(4) + b'\0\0\xc0\x3f'
     assert stored(one, 'ST9:0', 2) == b'\2\0iH'
-    assert stored(two, 'L10:1', 2) == b'\x70\x11\1\0'
+    assert stored(two, 'L10:255', 2) == b'\x70\x11\1\0'
     assert stored(two, 'I:1.0', 2) == b'\5\0\0\0'  # what is not named is 0
 
 
@@ -177,7 +177,7 @@ def test_message_of_a_plc2_and_a_plc3_writes_its_value_and_tells_that_it_is_conf
     assert command.data == bytes.fromhex(data)
     sending.reply(command.reply())
     last.reply(last.command.reply(sts=0x10))
-    assert said[0] == 'confirmed' and said[1].startswith('STS 10: ')
+    assert (said[0], len(said)) == ('confirmed', 2) and said[1].startswith('STS 10: ')
     assert last.command.tns == command.tns + 1
 
 
@@ -345,6 +345,7 @@ def test_plc_with_a_delay_replies_when_it_is_over(plc: SimulatedPlc, clock: Cloc
         assert master.poll().startswith(frames.STX)
         plc.handle(ACKNOWLEDGED)
         assert master.poll() == frames.EOT
+    plc.faults = InjectedFaults(delay=0.05, slow=2)
     master.deliver(READ)
     plc.faults = InjectedFaults()
     assert master.poll().startswith(frames.STX)
@@ -415,22 +416,26 @@ def test_power_cycle_keeps_words_and_begins_anew() -> None:
 
 def test_plcs_behind_a_gateway_are_one_station_of_the_line(tmp_path: Path) -> None:
     plcs = load(tmp_path / 'simulator.csv', Clock(), '1,PLC5,N7:0,,,,,10', '1,PLC5,F8:0,,,,,10',
-                '2,SLC,N7:0,,,,,10', '3,SLC,N7:0,,,,,')
-    direct, gateway = stations_of(plcs, Checksum.CRC)
+                '2,SLC,N7:0,,,,,10', '3,SLC,N7:0,,,,,', '4,SLC,N7:0,,,,,11')
+    direct, gateway, other = stations_of(plcs, Checksum.CRC)
     assert direct is plcs[2]
     assert isinstance(gateway, SimulatedGateway)
     for plc in plcs[:2]:
         identify = Packet(plc.station, 5, 0x06, 0, plc.station, b'\x03')
         frame = Frame(identify.encode(), 10)
-        assert direct.handle(frame) == b''
+        assert direct.handle(frame) == other.handle(frame) == b''
         assert gateway.handle(frame) == frames.ACK
         reply = plc.serve(identify)
         assert gateway.handle(Poll(10, True)) == frames.message_frame(reply.encode(), Checksum.CRC)
         gateway.handle(ACKNOWLEDGED)
-    echo = Packet(10, 5, 0x06, 0, 9, b'\0\7')  # for itself
-    gateway.handle(Frame(echo.encode(), 10))
-    assert gateway.handle(Poll(10, True)) == frames.message_frame(
-        echo.reply(b'\7').encode(), Checksum.CRC)
+    plcs[1].faults.silent = True
+    for dst, data, answer, sts in ((10, b'\0\7', b'\7', 0), (10, b'', b'', 0x10), (2, b'', b'', 2),
+                                   (4, b'', b'', 2)):  # itself, a silent PLC, one elsewhere
+        command = Packet(dst, 5, 0x06, 0, dst + len(data), data)
+        gateway.handle(Frame(command.encode(), 10))
+        assert gateway.handle(Poll(10, True)) == frames.message_frame(
+            command.reply(answer, sts).encode(), Checksum.CRC)
+        gateway.handle(ACKNOWLEDGED)
 
 
 @for_all(('first', 'second', 'text'), [
@@ -448,7 +453,8 @@ def test_rows_that_contradict_each_other(path: Path, first: str, second: str, te
 
 
 def test_simulated_slc_may_be_another_processor(path: Path, clock: Clock) -> None:
-    plc, = load(path, clock, '1,SLC,N7:0,,,,,,ML1400', '1,SLC,B3:0,,,,,,')
+    plc, = load(path, clock, *(f'1,SLC,{rest}' for rest in (
+        'N7:0,,,,,,ML1400', 'B3:0,,,,,,', 'N9:0,,,,,,ML1400')))
     status = plc.serve(Packet(1, 5, 0x06, 0, 1, b'\x03')).data
     assert decode_identity(status).processor is Processor.ML1400
     fault, = faults(path, '1,SLC,N7:0,,,,,,5/99')
@@ -472,6 +478,7 @@ def plcs() -> list[SimulatedPlc]:
     ('delay 12 50', InjectedFaults(delay=0.05), 'station 12: delay 50'),
     ('noise 12 0.01', InjectedFaults(noise=0.01), 'station 12: noise 0.01'),
     ('noise 12 0', InjectedFaults(), 'station 12: noise 0'),
+    ('slow 12 0', InjectedFaults(), 'station 12: slow 0'),
     ('noise 12 1', InjectedFaults(noise=1.0), 'station 12: noise 1'),
     ('delay 12 3600000', InjectedFaults(delay=3600.0), 'station 12: delay 3600000'),
     ('error 12 50', InjectedFaults(status=(0x50,)), 'station 12: error 50'),
@@ -498,21 +505,18 @@ def test_counters_are_told(plcs: list[SimulatedPlc]) -> None:
 
 @pytest.mark.parametrize('line, text', [
     ('silent', 'name a station (1, 12)'), ('silent 3', 'name a station (1, 12)'),
-    ('silent one', 'name a station (1, 12)'), ('hush 1', '"hush 1" is not a command'),
-    ('silent 1 2', '"silent 1 2" is not a command'), ('full 1 2', '"full 1 2" is not a command'),
-    ('counters 1 2', '"counters 1 2" is not a command'),
-    ('slow 1', '"slow 1" is not a command'),
+    ('silent 012', 'name a station (1, 12)'), *((line, f'"{line}" is not a command') for line in (
+        'hush 1', 'silent 1 2', 'full 1 2', 'counters 1 2', 'power 1 2', 'run 1 2', 'slow 1',
+        'delay 1', 'error 1', 'normal 1 x')),
     *((f'slow 1 {text}', f'slow 1 {text}: "{text}" should be a whole number from 0')
       for text in ('few', '-3', '1.5', '1_0', '\u0661')),
-    ('delay 1', '"delay 1" is not a command'),
     *((f'delay 1 {text}', f'delay 1 {text}: "{text}" should be ms from 0 to 3600000')
       for text in ('long', '-5', 'nan', '1e9', '1_0')),
     *((f'noise 1 {text}', f'noise 1 {text}: "{text}" should be a share from 0 to 1')
       for text in ('much', '-0.1', '1.1', 'nan')),
     *((f'error 1 {text}', f'error 1 {text}: "{text}" should be a byte in hexadecimal such as 0B')
       for text in ('zz', '5', '500000', '\u0661\u0661')),
-    ('msg 1 N7:0 70000', 'msg N7:0: value 70000 at index 0 is not a valid int16'),
-    ('error 1', '"error 1" is not a command'), ('normal 1 x', '"normal 1 x" is not a command')])
+    ('msg 1 N7:0 70000', 'msg N7:0: value 70000 at index 0 is not a valid int16')])
 def test_command_that_is_wrong_changes_nothing(
         plcs: list[SimulatedPlc], line: str, text: str) -> None:
     plcs[0].faults = before = InjectedFaults(slow=2)
@@ -558,7 +562,7 @@ def test_mode_is_told_by_the_diagnostic_status(plcs: list[SimulatedPlc], setting
 def test_message_is_queued_and_its_end_reported(plcs: list[SimulatedPlc]) -> None:
     told: list[str] = []
     plcs[1].be_full_duplex()
-    assert execute('msg 12 N7:0 5 -6', plcs, told.append) == 'station 12: msg N7:0 5 -6'
+    assert execute('msg 12 n7:0 5 -6', plcs, told.append) == 'station 12: msg N7:0 5 -6'
     assert told == []
     sending = plcs[1].outbox.pop()
     assert (sending.command.dst, sending.command.src) == (5, 12)
@@ -597,9 +601,10 @@ def test_scan_time_of_a_ladder() -> None:
     plc.run_ladder(Ladder(plc.table))
     assert plc.ladder is not None
     clock.now += 2.0
-    assert execute('scan 1 60', [plc]) == 'station 1: scan 60'
+    for scan in ('60', '1', '1000'):
+        assert execute(f'scan 1 {scan}', [plc]) == f'station 1: scan {scan}'
+        assert plc.ladder.scan_time == int(scan) / 1000
     assert plc.ladder.get(11, 3) > 10  # the scans of before had their own time
-    assert plc.ladder.scan_time == 0.06
     for text in ('0', '1001', 'fast'):
         with pytest.raises(CommandError, match=f'"{text}" should be ms from 1 to 1000'):
             execute(f'scan 1 {text}', [plc])
