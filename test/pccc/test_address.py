@@ -123,7 +123,7 @@ def test_str_is_the_plain_form(text: str, family: PlcType, shown: str) -> None:
 
 @for_all(('text', 'family', 'advice'), [
     ('S/26', SLC, 'the word of the status file comes first; write S:1/10'),
-    ('s2/15', PLC5, 'the word of the status file comes first; write S:0/15'),
+    (' s2/15 ', PLC5, 'the word of the status file comes first; write S:0/15'),
     ('N11[1]', SLC, 'an element stands after ":"; write N11:1'),
     ('I/3', SLC, 'write the word too, as in I:1/3'),
     ('O/5', PLC5, 'write the word too, as in O:017/12'),

@@ -126,6 +126,7 @@ def test_words_of_a_broadcast_meet_those_of_every_station_from_either_side() -> 
     for one, other in ((BROADCAST, 2), (2, BROADCAST)):
         assert Extent(one, area, 0, 2).meets(Extent(other, area, 1, 3))
         assert not Extent(one, area, 0, 2).meets(Extent(other, area, 2, 3))
+        assert not Extent(one, area, 0, 2).holds(Extent(other, area, 0, 1))
 
 
 # Every dialect against the emulated PLC that it is for

@@ -70,6 +70,7 @@ def command(data: str, cmd: int = 0x0F) -> Packet:
     ('01 00 00 01 00 2E 01 08 0A 00 02', 'word range read B10:0, 1 word'),
     ('01 00 00 01 00 34 03 04 02 02', 'word range read T:4.ACC, 1 word'),
     ('01 00 00 01 00 34 03 04 03 02', 'word range read E3.1.3.0.4.3, 1 word'),
+    ('01 00 00 01 00 3C 08 0A 02 05 02', 'word range read E3.1.8.10.2.5, 1 word'),
     ('00 00 00 02 00 07 00 07 05 01 00 FF FF', 'word range write N7:5 = 0001 FFFF'),
     ('02 07 00 03 01 08 00 01 00', 'bit write B3:1 set 0008 reset 0001'),
     ('04 00 00 04 00 0C 08 0A 08', 'file read B10:0, 4 words'),
@@ -101,13 +102,13 @@ def test_codes_of_commands_are_those_of_the_manual() -> None:
     """M 7-2, 7-3; 0A and 0B: 1756-PM020F p. 75; 0F/94 and 0F/A3: practice."""
     expected = """
         00 protected write, 01 unprotected read, 02 protected bit write, 03 physical write,
-        04 physical read, 05 unprotected bit write, 08 unprotected write,
-        0A connected CIP message, 0B unconnected CIP message,
+        04 physical read, 05 unprotected bit write,
         06/00 echo, 06/01 read diagnostic counters, 06/02 set variables, 06/03 diagnostic status,
         06/04 set timeout, 06/05 set NAKs, 06/06 set ENQs, 06/07 reset diagnostic counters,
         06/08 set data table size, 06/09 read link parameters, 06/0A set link parameters,
         07/00 disable outputs, 07/01 enable outputs, 07/03 enable scan,
         07/04 enter download mode, 07/05 exit download or upload mode, 07/06 enter upload mode,
+        08 unprotected write, 0A connected CIP message, 0B unconnected CIP message,
         0F/00 word range write, 0F/01 word range read, 0F/02 bit write, 0F/03 file write,
         0F/04 file read, 0F/05 download request, 0F/06 upload request, 0F/07 shut down,
         0F/08 physical write, 0F/09 physical read, 0F/0A restart, 0F/11 get edit resource,
@@ -122,9 +123,9 @@ def test_codes_of_commands_are_those_of_the_manual() -> None:
         0F/A3 read of words by physical address, 0F/A7 protected typed file read,
         0F/A9 protected typed logical write, 0F/AA protected typed logical write,
         0F/AB masked write, 0F/AF protected typed file write"""
-    assert {f'{cmd:02X}' + ('' if fnc is None else f'/{fnc:02X}') + f' {name}'
-            for (cmd, fnc), name in command_codes().items()} == {
-                *' '.join(expected.split()).split(', ')}
+    assert [f'{cmd:02X}' + ('' if fnc is None else f'/{fnc:02X}') + f' {name}'
+            for (cmd, fnc), name in command_codes().items()] == \
+        ' '.join(expected.split()).split(', ')
 
 
 @for_all(('cmd', 'effect', 'functions'), [
@@ -170,6 +171,7 @@ STATUS_REPLIES = (  # to diagnostic status
      'SLC 5/03 series B revision 3, REM RUN; name LINE 4'),
     ('08 BB 00 80 01 00 42 07 FD 00 0C 00 05 00 00 00 00',
      'PLC-5/15 series C revision C, PROG; major processor fault (word S:11 says which)'),
+    ('00 EE 10 10 00 00 34 12 42', '1785-KA series C revision C'),
     ('00 99 01 02 03 04 05 06 07 08', '00 99 01 02 03 04 05 06 07 08'), ('00', '00'))
 
 

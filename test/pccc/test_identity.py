@@ -211,13 +211,13 @@ def test_each_bit_of_a_plc5_has_one_remark_or_none() -> None:
     *((bytes.fromhex(data), None, text, address, 55) for data, text, address in (
         ('01 EE 10 10 34 12 00 20 21 00 00 30', '1785-KA series B revision B', 0x2000),
         ('00 EE 30 2F 34 12 00 20 21 00 30', '1785-KA5 series B revision B', 0x2000),
-        ('00 FE 19 00 00 30 00 20 21 00', '1785-KE series B revision B', 0x2000),
+        ('00 FE 19 00 00 30 00 20 3F 00', '1785-KE series B revision 31', 0x2000),
         ('00 FE 1B 00 00 00 44 41 03 00' + '20' * 8, '1784-KT or 1784-KT2 series A revision D',
          0x4144))),
     *((bytes((0, 0xFE, kind, 0, 0)) + name.ljust(9, b'\0') + b'xx' + bytes(8), None,
        f'{name.decode()} series A revision 1', 0, size)
       for kind, name, size in ((0x2C, b'1770-KF3', 20), (0x24, b'1784-KR', 55))),
-    (bytes.fromhex('00 99 12 34'), None, 'unknown processor (00 99 12 34)', 0, 55)])
+    (bytes.fromhex('00 99 1234567890AB CD'), None, 'unknown processor (00 99 12 34 56 78 90 AB)', 0, 55)])
 def test_modules_and_where_their_counters_are(
         data: bytes, family: PlcType | None, text: str, address: int, size: int) -> None:
     identity = decode_identity(data)
@@ -226,7 +226,8 @@ def test_modules_and_where_their_counters_are(
     assert identity.is_running is {'RUN': True, 'TEST': False}.get(text.rpartition(' ')[2])
 
 
-@for_all('data', [SLC, PLC2, PLC2_KA3, PLC3, bytes.fromhex('00 FE 24').ljust(24, b'\0')])
+@for_all('data', [SLC, PLC2, PLC2_KA3, PLC3, bytes.fromhex('00 FE 24').ljust(24, b'\0'),
+                  bytes.fromhex('00 EE 10 10 00 00 34 12 42')])
 def test_status_without_its_last_byte_is_of_no_known_processor(data: bytes) -> None:
     assert not str(decode_identity(data)).startswith('unknown')
     assert str(decode_identity(data[:-1])).startswith('unknown processor (')

@@ -75,7 +75,7 @@ def test_values_across_elements_are_read_in_whole_elements() -> None:
 
 def test_refused_or_odd_reply_is_no_file_and_leaves_an_identity_as_it_was() -> None:
     values = AddressedValues.of('N7:0', SLC)
-    for odd in (reply(b'\1'), reply(sts=0x10), reply(b'\x11', 0xF0)):
+    for odd in (reply(b'\1'), reply(sts=0x10), reply(b'\x11', 0xF0), reply(b'\x12', 0xF0)):
         assert len(requests_of(is_there(values.address, values.dialect), odd)) == 1
         assert len(requests_of(identify(), reply(FAULTED), odd)) == 2  # an old PLC-5
     # A gateway has lost its PLC, no buffer, access denied, owned by another node.
@@ -108,6 +108,7 @@ def test_what_must_not_be_written_is_refused_before_the_first_step() -> None:
         write(AddressedValues.of('HSC:0.ACC', SLC), [1])
     for text, length, fault in (('PD9:0.SP', 25, '25 float32 from PD9:0.SP reach to PD9:0.50'),
                                 ('C5:3/UN', 6, 'bits of a structure end with their word'),
+                                ('N7:0', 0, '0 elements do not fit at N7:0'),
                                 ('ST9:0', 3, 'each string needs its own call, with length 1')):
         with pytest.raises(FormatError, match=f'^{fault}'):
             AddressedValues.of(text, PlcType.PLC5, length)
@@ -218,5 +219,8 @@ def test_no_packet_divides_a_value(kind: ValueType, sizes: list[int]) -> None:
 
 
 def test_access_of_a_target_chooses_its_command() -> None:
-    values = AddressedValues.of('N7:0', PlcType.PLC5, access=Access.WORD_RANGE)
-    assert requests_of(read(values))[0].startswith('01 ')
+    values = AddressedValues.of('N7:0', PlcType.PLC5, 130, access=Access.WORD_RANGE)
+    assert requests_of(read(values), reply(bytes(244)), reply(bytes(16))) == [
+        '01 00 00 82 00 06 07 00 F4', '01 7A 00 82 00 06 07 00 10']
+    assert [request[:23] for request in requests_of(write(values, [0] * 130), reply())] == [
+        '00 00 00 82 00 06 07 00', '00 74 00 82 00 06 07 00']
