@@ -165,7 +165,8 @@ def test_value_that_does_not_change_is_published_again_after_the_longest_silence
     ({'Max_Silence': '500'}, 'Max_Silence is for rows with Publish Change'),
     ({'Publish': 'Change', 'Max_Silence': '50'}, 'should be ms from 100 to 3600000'),
     ({'Publish': 'Change', 'Deadband': '-1'}, 'Deadband should be a number from 0 on'),
-    ({'Publish': 'Change', 'Deadband': '1', 'Address': 'B3:0/1'}, 'for values that are numbers')])
+    *(({'Publish': 'Change', 'Deadband': '1', 'Address': address}, 'for values that are numbers')
+      for address in ('B3:0/1', 'ST9:0'))])
 def test_cells_that_go_with_changes_only(cells: dict[str, str], text: str) -> None:
     assert text in fault(Command='Read', **cells)
 

@@ -428,14 +428,15 @@ def test_row_on_demand_has_no_period_and_promises_nothing() -> None:
     ({'Command': 'Heartbeat'}, 'a Heartbeat row has no Write_Again'),
     ({'Command': 'Write', 'Station': '255'}, 'no station confirms what is written to 255'),
     ({'Command': 'Write', 'Write_Again': '1'}, 'should be ms from 100 to 3600000'),
-    ({'Period': 'on demand', 'Command': 'Serve', 'Station': '5'},
-     'Period "on demand" is for Read and ReadWrite rows'),
+    *(({'Period': 'on demand', 'Command': command, 'Station': '5'},
+       'Period "on demand" is for Read and ReadWrite rows') for command in ('Serve', 'Write')),
     ({'Period': 'on demand', 'Command': 'Heartbeat'},
      'Period = "on demand" should be ms from 100 to 60000'),
     ({'Period': 'on demand', 'Publish': 'Change'},
      'a row with Period "on demand" is published each time it is read; leave the cell empty'),
-    ({'Period': 'on demand', 'Address': 'B3:0/0', 'Command': 'Read', 'Alarm': 'WARN'},
-     'Alarm needs a row that is read again and again, not one with Period "on demand"')])
+    *(({'Period': 'on demand', 'Address': 'B3:0/0', 'Command': 'Read', column: cell},
+       f'{column} needs a row that is read again and again, not one with Period "on demand"')
+      for column, cell in (('Alarm', 'WARN'), ('Confirms', 'beat')))])
 def test_what_write_again_is_for_and_a_row_on_demand_cannot_have(
         cells: dict[str, str], expected: str) -> None:
     cells = cells if 'Period' in cells else {'Write_Again': '1000'} | cells

@@ -73,6 +73,7 @@ SPREADSHEET = ('; a spreadsheet may have made a date or time of it: give the col
     ('N７:0', FORM + '; character 2 is U+FF17 FULLWIDTH DIGIT SEVEN, not "7"'),
     ('N7：0', FORM + '; character 3 is U+FF1A FULLWIDTH COLON, not ":"'),
     ('N7:0–9', FORM + '; character 5 is U+2013 EN DASH, not "-"'),
+    ('N7:\x7f0', FORM + '; character 4 is U+007F'),
     ('N7:\u200b0', FORM + '; character 4 is U+200B ZERO WIDTH SPACE'),
     ('N7:\u00a00', FORM + '; character 4 is U+00A0 NO-BREAK SPACE, not " "')])
 def test_address_that_cannot_be_used(tmp_path: Path, address: str, expected: str) -> None:

@@ -138,6 +138,7 @@ def test_limit_of_floats_is_kept_by_the_float32_that_is_written(scaling: Scaling
             written = raw if scaling is None else raw * scaling.scale + scaling.offset
             assert -limit <= written <= limit
             assert written == pytest.approx(value, abs=1e-7)
+    assert raw_values(make_mapping('F8:0', 'Write', maximum=0.5), [0.5]) == [0.5]
     with pytest.raises(FormatError, match=r'value 0.1001 at index 0 is outside Min -0.1, Max 0.1'):
         raw_values(mapping, [0.1001])
 
@@ -159,10 +160,10 @@ def test_limit_of_scaled_32_bits_is_kept_to_the_raw_step(
 
 
 def test_message_between_the_last_raw_step_and_the_limit_is_refused() -> None:
-    mapping = make_mapping('N7:0', 'Write', maximum=11.5, scaling=Scaling(2.0))
-    assert raw_values(mapping, [10.4]) == [5]
-    with pytest.raises(FormatError, match='value 12 at index 0, the nearest that can be written'):
-        raw_values(mapping, [11.2])
+    mapping = make_mapping('N7:0', 'Write', maximum=12.5, scaling=Scaling(2.0, 1.0))
+    assert raw_values(mapping, [11.4]) == [5]
+    with pytest.raises(FormatError, match='value 13 at index 0, the nearest that can be written'):
+        raw_values(mapping, [12.2])
 
 
 def test_limit_of_long_words_is_not_that_of_a_float32() -> None:
