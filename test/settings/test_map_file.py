@@ -92,6 +92,7 @@ def test_via_that_cannot_be(cells: dict[str, str], text: str) -> None:
 
 T = {'Topic': 't', 'Command': 'Write'}
 READ = {'PLC_Type': 'SLC', 'Command': 'Read'}
+SERVE = {'Command': 'Serve'}
 OF_A = ' of item 1 (line 2, tag "a")'
 NEEDS = 'Item: 2, write topic "t" needs the message type (int16) and Length (1)' + OF_A
 
@@ -132,6 +133,7 @@ def test_rows_that_clash(first: dict[str, str], second: dict[str, str], text: st
     [{'Topic': 't', 'Command': 'Read'}, T | {'Address': 'N7:9', 'Type': 'uint16'}],
     [T, T | {'Station': '2'}, T | {'Command': 'ReadWrite', 'Address': 'N7:50', 'PLC_Type': 'SLC'}],
     [{}, {}], [READ | {'Processor': 'ML1000'}, {}],
+    [READ | cells for cells in (SERVE, {'Via': '10', 'Processor': 'ML1000'}, SERVE)],
     [READ, READ | {'Processor': '5/03'}, {}, READ | {'Station': '2', 'Processor': '5/01'},
      READ | {'Station': '255', 'Command': 'Write'},
      READ | {'Station': '255', 'Command': 'Write', 'Processor': '5/01'}]])
@@ -255,8 +257,9 @@ def test_command_says_whether_a_row_reads_and_writes(text: str, reads: bool, wri
     ({'Offset': '1e9'},
      '15 (Offset): Item: 1, a float32 has too few digits to tell the values apart in 999967232 '
      'to 1000032767, the range of int16 with Scale 1, Offset 1000000000'),
-    ({'Access': 'CIF'},
-     '16 (Access): Item: 1, Access = "CIF" of a PLC5 should be one of Typed, WordRange'),
+    *(({'Access': access},
+       f'16 (Access): Item: 1, Access = "{access}" of a PLC5 should be one of Typed, WordRange')
+      for access in ('CIF', 'Read')),
     ({'Access': 'Typed', 'Command': 'Serve'}, '16 (Access): Item: 1, Access = "Typed" of a Serve '
      'row should be Read, for words that the other end cannot write, or empty'),
     *(({'PLC_Type': 'PLC2', 'Access': 'CIF'} | place, '3 (Address): Item: 1, Access CIF has no '
@@ -527,7 +530,7 @@ def test_advice_about_a_range_is_read_as_what_it_says(
 
 
 def test_length_beside_a_range_agrees_with_it() -> None:
-    for length in (9, 11):
+    for length in (1, 9, 11):
         assert fault(Address='N7:0-9', Length=str(length)) == (
             f'2:6 (Length): Item: 1, N7:0-9 has Length 10, not {length}')
     assert fault(Address='N7:0-8', Type='int32') == (

@@ -145,7 +145,7 @@ def test_what_is_told_of_a_map(tmp_path: Path, text: str, expected: list[str]) -
     (f'{HEAD},Min,Max\na,Read,N7:0,1,SLC,1,5\n', [
         '2:6 (Min): Min has no effect in a Read row', '2:7 (Max): Max has no effect in a Read row',
     ]),
-    (f'{HEAD},Period,Publish\na,Write,N7:0,1,SLC,100,Change\n', [
+    (f'{HEAD},Period,Publish\na,Write,N7:0,1,SLC,100,Change\nb,Write,N7:1,1,SLC,,always\n', [
         '2:6 (Period): Period has no effect in a Write row',
         '2:7 (Publish): Publish has no effect in a Write row']),
     (f'{HEAD},Topic\na,Read,N7:0,1,SLC,/cell/x\n', [
@@ -156,11 +156,11 @@ def test_what_is_told_of_a_map(tmp_path: Path, text: str, expected: list[str]) -
     (f'{HEAD}\na,Read,T4:0,1,SLC\nb,Read,T4:0.ACC,1,SLC\nc,Read,T4:0/DN,1,SLC\n', [
         '2:3 (Address): T4:0 is the control word of the element; its values are T4:0.PRE, '
         'T4:0.ACC']),
-    (f'{HEAD},Length\na,Read,C5:0,1,PLC5,3\n', []),
+    (f'{HEAD},Length\na,Read,C5:0,1,PLC5,6\n', []),
     (f'{HEAD},Length\na,Read,T4:0.PRE,1,SLC,2\n', []),
-    (f'{HEAD},Length\na,Read,T4:0.ACC,1,SLC,4\n', [
-        '2:6 (Length): 4 words from T4:0.ACC on are also the control word T4:1; whole elements '
-        'are T4:0, and Length 6']),
+    (f'{HEAD},Length\na,Read,T4:0.ACC,1,SLC,8\n', [
+        '2:6 (Length): 8 words from T4:0.ACC on are also the control word T4:1; whole elements '
+        'are T4:0, and Length 12']),
     (f'{HEAD},Length,Processor\na,Read,HSC:0.LPO,1,SLC,2,ML1400\n', [
         '2:6 (Length): 2 words from HSC:0.LPO on are also the control word HSC:1']),
     (f'{HEAD}\na,Write,T4:0/DN,1,SLC\nb,Write,C5:0.ACC,1,SLC\nc,Serve,C5:0/CU,5,PLC5\n', [
@@ -227,8 +227,8 @@ PORT = ('should be a number from 1, a device path such as /dev/ttyUSB0, socket:/
         '!2:2 (Timeout): Timeout = "1 s" should be a whole number from 0 to 360000 ms']),
     ('Com_Port\n192.168.0.9:4001\n', [f'!2:1 (Com_Port): Com_Port = "192.168.0.9:4001" {PORT}; '
                                       'write socket://192.168.0.9:4001']),
-    ('Com_Port\ntcp://plc:4001\n', [f'!2:1 (Com_Port): Com_Port = "tcp://plc:4001" {PORT}; '
-                                    'write socket://plc:4001']),
+    ('Com_Port\ntcp://plc:65535\n', [f'!2:1 (Com_Port): Com_Port = "tcp://plc:65535" {PORT}; '
+                                     'write socket://plc:65535']),
     ('Com_Port\nsocket://plc:65536\n', [
         f'!2:1 (Com_Port): Com_Port = "socket://plc:65536" {PORT}; a port is at most 65535']),
     ('Com_Port\nsocket://192.168.0.9\n', [
@@ -298,8 +298,9 @@ GOOD = Network(timeout=300)
     (Network(mode='Radio', store_forward='5,6'), [
         'Store_Forward names our own Station 5; it is for nodes that hear each other only through '
         'us']),
-    (Network(share_access='Write'), [
-        'Share_Access is for a line with Share; it has no effect without Share']),
+    *((Network(share_access=access), [
+        'Share_Access is for a line with Share; it has no effect without Share'])
+      for access in ('Write', 'All')),
     (Network(share='pty:/tmp/hmi', share_access='Write'), []),
     (Network(share='pty:/tmp/hmi', share_access='All'), [
         'Share_Access All: guests may change modes, download and reset, too']),
@@ -340,7 +341,7 @@ def remarks_of(folder: Path, row: str) -> list[str]:
     ('lamp,Read,I:1.0/3,1,SLC,,,,,', []),
     ('mode,ReadWrite,S:1,1,PLC5,,,,,', [
         ':2:2 (Command): S2:1 is in the status file: a write may change how the processor runs']),
-    ('ours,Serve,S:1,5,PLC5,,,,,', []),
+    ('ours,Serve,S:1,5,PLC5,,,,,', []), ('ours,Serve,L9:0,5,SLC,,,,,', []),
     ('level,Write,N7:0,1,SLC,,,-40000,40000,', [
         ':2:8 (Min): Min -40000 is below -32768, the least that int16 can hold here',
         ':2:9 (Max): Max 40000 is above 32767, the most that int16 can hold here']),

@@ -184,7 +184,7 @@ def test_com_port_may_be_a_number_a_device_or_a_url(path: Path, text: str, port:
                   'socket://:4001', 'sokket://host:4001', 'loop://',
                   '://host:1', 'hwgrep://0403:6001', 'spy:///dev/ttyUSB0',
                   'alt://x:1', 'cp2110://x:1', 'socket://host:1?logging=debug',
-                  'rfc2217://host:1/x'])
+                  'rfc2217://host:1/x', 'rfc2217://host:1#x'])
 def test_com_port_that_is_no_port_is_refused(path: Path, text: str) -> None:
     fault, = faults(path, 'Com_Port', text)
     assert fault.startswith(f'FILE:2:1 (Com_Port): Com_Port = "{text}" should be a number')
@@ -349,7 +349,7 @@ LISTENING = {'Com_Port': '/dev/ttyS0', 'Mode': 'Listen'}
     ({'Listen_Port': '0'}, 'Listen_Port = "0" should be a number from 1'),
     ({'Listen_Port': '²'}, 'Listen_Port = "²" should be a number from 1'),
     ({'Listen_Port': '1'}, 'Listen_Port: 1 is the device of Com_Port, too'),
-    ({'Com_Port': '1', 'Listen_Port': '/dev/ttyS0'}, ' /dev/ttyS0 is the device of Com_Port, too'),
+    ({'Com_Port': '1', 'Listen_Port': '/dev//ttyS0'}, '/dev//ttyS0 is the device of Com_Port, too'),
     ({'Com_Port': 'rfc2217://h:1'}, 'RFC 2217 sets the lines of the far port'),
     ({'Com_Port': 'socket://h:1', 'Listen_Port': '/dev/ttyS1'},
      'both ports must be devices of this machine')])
