@@ -217,7 +217,7 @@ def test_each_bit_of_a_plc5_has_one_remark_or_none() -> None:
     *((bytes((0, 0xFE, kind, 0, 0)) + name.ljust(9, b'\0') + b'xx' + bytes(8), None,
        f'{name.decode()} series A revision 1', 0, size)
       for kind, name, size in ((0x2C, b'1770-KF3', 20), (0x24, b'1784-KR', 55))),
-    (bytes.fromhex('00 99 1234567890AB CD'), None, 'unknown processor (00 99 12 34 56 78 90 AB)', 0, 55)])
+    (b'\0\x99' + b'1234567', None, 'unknown processor (00 99 31 32 33 34 35 36)', 0, 55)])
 def test_modules_and_where_their_counters_are(
         data: bytes, family: PlcType | None, text: str, address: int, size: int) -> None:
     identity = decode_identity(data)

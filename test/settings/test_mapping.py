@@ -128,7 +128,7 @@ def test_the_usual_processor_is_the_default() -> None:
     ('a-b', 'a_b'), ('a b', 'a_b'), ('Tank.Level', 'Tank_Level'), ('Füllstand', 'F_llstand'),
     ('cell/2/guard', 'cell/t2/guard'), ('a//b', 'a/b'), ('/a/', 'a'), ('a / b', 'a/b'),
     ('__a__b__', 'a_b'), ('_hidden', 'hidden'), ('~private', 'private'), ('{node}', 'node'),
-    ('a:::b', 'a_b'), ('a/_/b', 'a/b'), ('0', 't0'), ('CamelCase', 'CamelCase')])
+    ('a:::b', 'a_b'), ('a/_/b', 'a/b'), ('0', 't0'), ('_7', 't7'), ('CamelCase', 'CamelCase')])
 def test_name_of_a_text(text: str, name: str) -> None:
     assert sanitise(text) == name
 

@@ -258,7 +258,8 @@ def test_place_is_a_link_a_port_or_a_device(text: str, place: SharePlace) -> Non
     ('hmi', '"hmi" should be pty:/a/name, tcp:PORT'), ('pty:hmi', 'pty:/a/name'),
     ('tcp:', 'tcp:PORT (for this machine only)'), ('tcp:70000', 'tcp:PORT'), ('tcp:0', 'tcp:PORT'),
     ('tcp:plant.example:4501', 'the address of an interface'),
-    ('pty:/tmp/a?baud=9600', 'only a serial device has baud'),
+    *((text, 'only a serial device has baud') for text in (
+        'pty:/tmp/a?baud=9600', 'tcp:99?parity=Odd')),
     ('/dev/ttyS1?speed=9600', 'after "?" may come baud=1200|'),
     ('/dev/ttyS1?check=LRC', 'check=BCC|CRC'), ('tcp:99?check=', 'after "?" may come'),
     ('pty:/tmp/a pty:/tmp/a?check=BCC', 'there twice'),
@@ -317,10 +318,11 @@ def test_parameter_has_to_go_with_the_rest_of_the_file(
 
 
 def test_place_that_is_open_to_other_machines_is_told() -> None:
-    remarks = [*network_remarks(Network(share='pty:/tmp/a tcp:127.0.0.2:1 tcp:0.0.0.0:4501'))]
-    assert remarks == [
-        'Share tcp:0.0.0.0:4501: every program that reaches 0.0.0.0:4501 over the network '
-        'can send commands to the PLC, without a password']
+    places = 'tcp:0.0.0.0:4501', 'tcp:10.0.0.1:9?check=BCC'
+    remarks = network_remarks(Network(share=' '.join(('pty:/tmp/a tcp:127.0.0.2:1', *places))))
+    assert [*remarks] == [
+        f'Share {place}: every program that reaches {place[4:].split("?")[0]} over the network '
+        'can send commands to the PLC, without a password' for place in places]
     assert [*network_remarks(Network())] == []
 
 
@@ -348,8 +350,8 @@ LISTENING = {'Com_Port': '/dev/ttyS0', 'Mode': 'Listen'}
      'from 1 or a device path such as /dev/ttyUSB1'),
     ({'Listen_Port': '0'}, 'Listen_Port = "0" should be a number from 1'),
     ({'Listen_Port': '²'}, 'Listen_Port = "²" should be a number from 1'),
-    ({'Listen_Port': '1'}, 'Listen_Port: 1 is the device of Com_Port, too'),
-    ({'Com_Port': '1', 'Listen_Port': '/dev//ttyS0'}, '/dev//ttyS0 is the device of Com_Port, too'),
+    ({'Listen_Port': '1'}, '2:3 (Listen_Port): Listen_Port: 1 is the device of Com_Port, too'),
+    ({'Com_Port': '1', 'Listen_Port': '/dev//ttyS0'}, '/ttyS0 is the device of Com_Port, too'),
     ({'Com_Port': 'rfc2217://h:1'}, 'RFC 2217 sets the lines of the far port'),
     ({'Com_Port': 'socket://h:1', 'Listen_Port': '/dev/ttyS1'},
      'both ports must be devices of this machine')])

@@ -104,9 +104,9 @@ def test_value_less_than_half_a_step_outside_is_rounded_into_the_range(value: fl
 @for_all(('kind', 'scaling', 'error'), [
     (ValueType.BOOL, Scaling(), 'Scale and Offset are for numbers, not for bool'),
     (ValueType.STRING, Scaling(), 'Scale and Offset are for numbers, not for string'),
-    (ValueType.INT16, Scaling(0.001, 20000.0),
-     'a float32 has too few digits to tell the values apart in 19967.232 to 20032.767, the range '
-     'of int16 with Scale 0.001, Offset 20000'),
+    (ValueType.INT16, Scaling(0.001, -8191.0),
+     'a float32 has too few digits to tell the values apart in -8223.768 to -8158.233, the range '
+     'of int16 with Scale 0.001, Offset -8191'),
     (ValueType.UINT16, Scaling(1e-46),
      'a float32 has too few digits to tell the values apart in 0 to 6.5535e-42, the range of '
      'uint16 with Scale 1e-46, Offset 0'),
@@ -116,7 +116,7 @@ def test_value_less_than_half_a_step_outside_is_rounded_into_the_range(value: fl
      'a float32 cannot hold -1e+39 to -1e+39, the range of int32 with Scale 1, Offset -1e+39'),
     (ValueType.INT16, Scaling(0.001, 2000.0), None), (ValueType.INT32, Scaling(0.001), None),
     (ValueType.UINT32, Scaling(1.0), None), (ValueType.FLOAT32, Scaling(1000.0, -273.15), None),
-    (ValueType.BCD16, Scaling(-0.01, 100.0), None)])
+    (ValueType.BCD16, Scaling(-0.01, 100.0), None), (ValueType.UINT16, Scaling(1e-40), None)])
 def test_values_that_cannot_be_scaled_and_some_that_can(
         kind: ValueType, scaling: Scaling, error: str | None) -> None:
     assert scaling.fault(kind) == error

@@ -151,7 +151,8 @@ def test_data_file_of_a_plc2_and_a_plc3(path: Path, clock: Clock) -> None:
 
 def test_common_interface_file_of_a_micrologix_1000_is_n7(path: Path, clock: Clock) -> None:
     """M 7-31; it has no file 9."""
-    old, new = load(path, clock, '1,SLC,N7:0,4,,,,,ML1000', '2,SLC,N7:0,4,,,,,ML1400', '2,SLC,N9:0,4,,,')
+    old, new = load(path, clock, '1,SLC,N7:0,4,,,,,ML1000', '2,SLC,N7:0,4,,,,,ML1400',
+                    '2,SLC,N9:0,4,,,')
     for plc, file in ((old, 'N7'), (new, 'N9')):
         assert plc.serve(Packet(plc.station, 0, 0x08, 0, 1, b'\x02\x00\x34\x12')).sts == 0
         assert stored(plc, f'{file}:2') == b'\x34\x12'
