@@ -301,7 +301,7 @@ def test_cells_that_just_fit() -> None:
     assert one(Address='T4:0/13', Length='3', Command='Read')
     assert one(Address='F8:0', Word_Order='Low').word_order is WordOrder.LOW
     assert one(PLC_Type='PLC2', Address='020/05', Access='CIF', Command='Read')
-    assert one(Address='N7:998', Type='int32')
+    assert one(Address='N7:998', Type='int32') and one(Address='T4:0.PRE', Type='uint16')
 
 
 LONG = 'x' * 5000
@@ -538,8 +538,5 @@ def test_length_beside_a_range_agrees_with_it() -> None:
         'N7:0-N7:8 are 9 words, and a int32 takes 2')
     assert fault(Address='N7:0-1', Command='Heartbeat') == (
         '2:3 (Address): Item: 1, a heartbeat is one word')
-
-
-def test_range_where_one_address_is_meant_is_told_with_its_length() -> None:
     with pytest.raises(FormatError, match='^write T4:0, and Length 12$'):
         parse_address('T4:0-3', PlcType.SLC)

@@ -92,16 +92,14 @@ def test_digits_share_no_bit_with_the_status_bits_above_them(
     assert digits.shares_words(other) is other.shares_words(digits) is is_shared
 
 
-def test_columns_are_those_of_the_interface() -> None:
+def test_columns_are_those_of_the_interface_each_once_and_described() -> None:
     assert COLUMNS == ('Tag', 'Command', 'Address', 'Station', 'PLC_Type', 'Length', 'Type',
                        'Topic', 'Period', 'Publish', 'Min', 'Max', 'Word_Order', 'Scale',
                        'Offset', 'Access', 'Processor', 'Fallback', 'Fallback_After',
                        'While', 'While_Timeout', 'Confirms', 'Via', 'Description', 'Alarm',
                        'Deadband', 'Max_Silence', 'Write_Again')
-
-
-def test_every_column_is_there_once_and_described() -> None:
     assert len(BY_NAME) == len(MAP_COLUMNS)
+    assert BY_NAME['Processor'].default == USUAL.value
     assert [name for name, column in BY_NAME.items() if not column.description] == []
 
 
@@ -117,10 +115,6 @@ def test_every_choice_is_named(name: str, choices: type[Enum]) -> None:
 def test_accesses_stand_in_their_order(plc_type: PlcType) -> None:
     ways = ', '.join(way.value for way in FAMILIES[plc_type].accesses)
     assert f'{plc_type.value}: {ways}' in BY_NAME['Access'].description
-
-
-def test_the_usual_processor_is_the_default() -> None:
-    assert BY_NAME['Processor'].default == USUAL.value
 
 
 @for_all(('text', 'name'), [

@@ -14,6 +14,7 @@
 
 """The simulated PLC: its data file, motions, faults and commands, on a clock of the test."""
 
+import copy
 import math
 from pathlib import Path
 from unittest.mock import MagicMock, Mock
@@ -381,11 +382,13 @@ def test_program_stands_still_outside_of_run_but_tables_answer() -> None:
 
 def test_download_brings_back_the_words_of_the_start() -> None:
     clock, plc = _with_ladder()
+    words = copy.deepcopy(plc.table.words)
     for _ in range(2):
         store(plc, 'N10:0', [5, 42])
+        store(plc, 'S:0', [3])
         clock.now += 1.0
         plc.download()
-        assert (stored(plc, 'N10:0', 2), stored(plc, 'N11:3')) == (bytes(4), bytes(2))
+        assert plc.table.words == words
     assert not plc.is_running
     clock.now += 3.0
     plc.set_mode(Setting.REMOTE)
@@ -572,14 +575,12 @@ def test_message_is_queued_and_its_end_reported(plcs: list[SimulatedPlc]) -> Non
     assert not plcs[0].outbox
 
 
-@pytest.mark.parametrize(('verb', 'setting'), [
-    ('program', Setting.PROGRAM), ('test', Setting.TEST), ('run', Setting.REMOTE)])
 def test_modes_have_commands_of_their_own(
-        verb: str, setting: Setting, monkeypatch: pytest.MonkeyPatch) -> None:
-    plc = simulated_plc(1, 'SLC', lambda: 0.0, ('N7:0', 4))
+        plcs: list[SimulatedPlc], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(SimulatedPlc, 'set_mode', set_mode := Mock())  # it sets more than a word
-    assert execute(f'{verb} 1', [plc]) == f'station 1: mode {setting.value}'
-    set_mode.assert_called_once_with(setting)
+    for verb, mode in ('program', 'program'), ('test', 'test'), ('run', 'remote'):
+        assert execute(f'{verb} 1', plcs) == f'station 1: mode {mode}'
+        set_mode.assert_called_with(Setting(mode))
 
 
 def test_download_power_and_reset() -> None:
