@@ -131,7 +131,7 @@ def encoded(plc_type: PlcType, setting: Setting = Setting.REMOTE,
     return FAMILIES[plc_type].encode_identity(EmulatedProcessor(setting, is_full_duplex))
 
 
-def test_slc_has_the_layout_of_the_vectors() -> None:
+def test_slc_and_plc5_have_the_layout_of_the_vectors() -> None:
     ours = encoded(PlcType.SLC, is_full_duplex=True)
     theirs = pair('diag_status_slc504')[1].data
     assert len(ours) == len(theirs) == 24
@@ -141,9 +141,6 @@ def test_slc_has_the_layout_of_the_vectors() -> None:
     assert ours[16:20] == b'\0\0\x06\0'  # no major error, remote run
     assert ours[23] == theirs[23] == 0xFC  # no owner of the program
     assert encoded(PlcType.SLC)[2] == 0x36  # half duplex
-
-
-def test_plc5_has_the_layout_of_the_vectors() -> None:
     ours = encoded(PlcType.PLC5)
     theirs = pair('diag_status_plc5_40')[1].data
     assert len(ours) == len(theirs) == 36

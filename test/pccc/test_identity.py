@@ -53,14 +53,12 @@ def test_slc_of_the_vectors() -> None:
         PlcType.SLC, 'SLC 5/04', 'B', '3', Mode.RUN, 'RUN', name='5/04', program_id=0x1234,
         memory='32 K', interface=0x34, processor=Processor.SLC_5_04,
         counter_layout=FULL_DUPLEX_COUNTERS)
-    assert identity.is_running
 
 
 def test_plc5_of_the_vectors() -> None:
     identity = decode_identity(PLC5)
     assert str(identity) == 'PLC-5/40 series C revision C, REM RUN'
     assert (identity.plc_type, identity.memory) == (PlcType.PLC5, '98304 (unit not documented)')
-    assert identity.is_running
     assert (identity.faults, identity.remarks) == ((), ())
 
 

@@ -225,17 +225,18 @@ def test_plc5_read_modify_write_of_the_same_word_twice_runs_in_order() -> None:
     assert words_at(words, 'B3:0') == '02 00'
 
 
-def test_files_of_a_plc_5_80_are_counted_to_their_end() -> None:
+def test_files_of_a_plc5_have_their_type_and_are_counted_to_their_end() -> None:
     """The files of a PLC-5/40 to 5/80 may have 2,000 elements."""
-    for number in (12, 8):  # 8 is by default a file of floats
+    for text, count in (('N12:0', 1500), ('N8:0', 1500), ('F8:0', 3), ('F12:0', 3), ('A12:0', 5),
+                        ('ST12:0', 2), ('D12:0', 4), ('B3:0', 2), ('T4:0', 6), ('C12:0', 7)):
         there = DataTable(PlcType.PLC5)
-        there.create(parse_address(f'N{number}:0', PlcType.PLC5), 1500)
-        steps = Plc5FileSearch().look_for(number)
+        there.create(at(text), count * at(text).layout.words)
+        steps = Plc5FileSearch().look_for(at(text).file)
         request = next(steps)
         with pytest.raises(StopIteration) as done:
             while True:
                 request = steps.send(Server(there).serve(Packet(1, 0, 0x0F, 0, 7, request[1])))
-        assert done.value.value == DataFile(FileType.INTEGER, number, 1500)
+        assert done.value.value == DataFile(at(text).file_type, at(text).file, count)
     next(steps := Plc5FileSearch().look_for(12))
     with pytest.raises(RemoteError, match='STS 02'):  # a gateway that has lost the PLC
         steps.send(Packet(1, 0, 0x4F, 2, 7))

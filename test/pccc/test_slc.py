@@ -145,7 +145,7 @@ def test_files_of_a_recorded_micrologix_1400() -> None:
 
 
 def test_files_of_an_emulated_slc() -> None:
-    answer = served(*ALL_SLC, ('PTO:0', 15))
+    answer = served(*ALL_SLC[:3], ('PTO:0', 15), *ALL_SLC[3:])
     # Type 1 at byte 69, the length after it, first file at 79: so pycomm3 reads that of a 5/05.
     assert answer(bytes.fromhex('A1 0E 00 01 22')).data == bytes.fromhex(
         '00 01 21 01 00 00 00 00 00 00 00 82 04 00')

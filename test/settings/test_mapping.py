@@ -32,11 +32,6 @@ from support.cases import for_all
 from support.mappings import cell_of, make_mapping, one
 
 
-def test_codec_of_a_bit_mapping_begins_at_its_bit() -> None:
-    codec = one(Address='B3:2/5', Length='20').codec
-    assert (codec.bit, codec.length, codec.words) == (5, 20, 2)
-
-
 def test_cells_as_text_with_defaults_filled_in() -> None:
     mapping = one(Tag='Line speed', Command='read', Address='n7;3', Station='07')
     cells = {column: cell_of(mapping, column) for column in COLUMNS}
