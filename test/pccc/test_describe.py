@@ -25,7 +25,7 @@ def command(data: str, cmd: int = 0x0F) -> Packet:
 
 @for_all(('data', 'text'), [
     ('A2 08 07 89 1E 00', 'protected typed logical read N7:30, 4 words'),
-    ('A2 02 05 87 02 02', 'protected typed logical read C5:2.ACC, 1 word'),
+    ('A2 06 05 87 02 02', 'protected typed logical read C5:2.ACC, 3 words'),
     ('A2 0C 04 86 01 00', 'protected typed logical read T4:1, 2 elements'),
     ('A2 02 04 86 01 03', 'protected typed logical read T4:1 + 3 words, 1 word'),
     ('A2 08 08 8A 04 00', 'protected typed logical read F8:4, 2 elements'),
@@ -55,6 +55,8 @@ def command(data: str, cmd: int = 0x0F) -> Packet:
     ('26 07 00 03 01 F7 FF 08 00', 'read-modify-write B3:1 AND FFF7 OR 0008'),
     ('26 07 00 03 01 F7 FF 08 00 07 00 03 02 FF FF 01 00',
      'read-modify-write B3:1 AND FFF7 OR 0008, B3:2 AND FFFF OR 0001'),
+    ('A2 02 07 89 1E 00 01 00', 'protected typed logical read, malformed (2 bytes too many): '
+     'A2 02 07 89 1E 00 01 00'),
     ('A1 02 07 89 1E', 'protected typed logical read N7:30, 1 word'),
     ('A9 02 07 89 1E 05 00', 'protected typed logical write N7:30 = 5'),
     ('01 00 00 0A 00 07 00 07 00 14', 'word range read N7:0, 10 words'),

@@ -18,7 +18,7 @@ from abdf1_ros.pccc import members
 from abdf1_ros.pccc.families import dialect_of, FAMILIES
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.members import Members
-from abdf1_ros.pccc.processor import Processor, USUAL
+from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.slc.address import BY_CODE
 import pytest
 from support.cases import for_all
@@ -191,12 +191,6 @@ SLC_FILES = FAMILIES[PlcType.SLC].file_types
 def missing(name: str, file: int = 7) -> set[str]:
     """Return the letters of the files that a processor cannot have as number ``file``."""
     return {kind.value for kind in SLC_FILES if not Processor(name).has_file(file, kind)}
-
-
-def test_names_are_those_of_the_map_file() -> None:
-    assert [processor.value for processor in Processor] == [
-        '5/01', '5/02', '5/03', '5/04', '5/05', 'ML1000', 'ML1100', 'ML1200', 'ML1400', 'ML1500']
-    assert USUAL is Processor('5/03')
 
 
 @pytest.mark.parametrize(('names', 'letters'), [

@@ -137,19 +137,17 @@ def test_words_may_come_as_bits_characters_or_bcd(text: str, typed: TypedData) -
 @for_all(('text', 'words', 'typed'), [
     ('PD9:0.SP', 2, TypedData(4, 2, bytes(4))), ('PD9:0.SP', 2, TypedData(0x15, 164, bytes(164))),
     ('PD9:0', 82, TypedData(8, 4, bytes(164))), ('PD9:0', 1, TypedData(8, 4, bytes(4))),
-    ('MG9:0', 56, TypedData(0x16, 112, bytes(224)))])
+    ('MG9:0', 56, TypedData(0x16, 112, bytes(224))), ('A9:0', 2, TypedData(3, 1, bytes(3))),
+    ('T4:0', 3, TypedData(5, 8, bytes(8)))])
 def test_reply_that_is_no_part_of_a_structure(text: str, words: int, typed: TypedData) -> None:
     with pytest.raises(FormatError):
         DIALECT.read_data(at(text), words, typed.encode())
 
 
-def test_plc5_timer_is_read_with_its_two_internal_words() -> None:
+def test_plc5_timer_is_read_and_written_with_its_two_internal_words() -> None:
     words = table(PLC5, T4_0='00 E0 64 00 2A 00 01 00 02 00 03 00')
     assert ask(words, '68 00 00 02 00 07 00 04 00 02 00') == (
         0, '99 09 16 59 0A 00 E0 64 00 2A 00 00 00 00 00 01 00 02 00 03 00 00 00 00 00')
-
-
-def test_plc5_timer_is_written_with_its_two_internal_words() -> None:
     words = table(PLC5, T4_0='00 00' * 9)
     assert ask(words, '67 00 00 02 00 07 00 04 01 99 09 16 59 0A 00 C2 0A 00 09 00 01 01 01 01 '
                       '00 C3 0B 00 08 00 01 01 01 01') == (0, '')
@@ -186,7 +184,7 @@ def test_plc5_structures_as_a_whole(name: str, words: int, number: int, descript
     ('68 00 00 05 00 07 00 07 00 05 00', '07'), ('68 00 00 01 00 07 00 07 00 02 00', '01'),
     ('68 01 00 01 00 07 00 07 00 01 00', '01'), ('68 00 00 00 00 07 00 07 00 00 00', '01'),
     ('68 00 00 01 00 0F 00 07 00 01 01 00', '03'), ('68 00 00 01 00 0F 00 04 00 03 01 00', '03'),
-    ('67 00 00 01 00 07 00 07 00 95 09 42 01 00 02 00', '01'),
+    ('67 01 00 02 00 07 00 07 00 95 09 42 01 00 02 00', '01'),
     ('67 00 00 01 00 07 00 07 00 91 09 42', '01'),
     ('67 00 00 01 00 07 00 07 00 96 09 94 08 00 00 00 00', '17'),
     ('67 00 00 01 00 07 00 04 00 97 09 56 01 00 02 00 03 00', '17'),
@@ -213,10 +211,13 @@ def test_bytes_after_a_command_are_padding_if_they_are_0() -> None:
     assert ask(words, '26') == (0x10, '')
 
 
-def test_plc5_reply_beyond_240_bytes_is_refused() -> None:
+def test_plc5_reply_or_write_beyond_240_bytes_is_refused() -> None:
     words = table(PLC5, N7_0='00 00' * 200)
     assert ask(words, '68 00 00 76 00 07 00 07 00 76 00')[0] == 0
     assert ask(words, '68 00 00 77 00 07 00 07 00 77 00') == (0xF0, '0A')
+    for size, answer in ((0xE9, (0, '')), (0xEB, (0xF0, '0A'))):  # with the address
+        data = f'67 00 00 76 00 06 07 00 99 09 {size:X} 42' + (size - 1) * '00'
+        assert ask(words, data) == answer
 
 
 def test_plc5_read_modify_write_of_the_same_word_twice_runs_in_order() -> None:

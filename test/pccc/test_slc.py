@@ -106,7 +106,7 @@ def test_packets_are_as_long_as_the_processor_takes_them(name: str, read: int, w
     assert dialect.max_write(FileType.PID) == write // 46 * 23
 
 
-ALL_SLC = ('O:2.0', 2), ('I:1.0', 1), ('I:3.0', 4), ('S:0', 33), ('N7:0', 90), ('ST20:0', 84)
+ALL_SLC = ('O:2.0', 2), ('I:1.0', 1), ('I:3.0', 4), ('S:0', 33), ('N12:0', 90), ('ST20:0', 84)
 
 
 def steps_of(processor: Processor) -> Steps[list[DataFile]]:
@@ -147,11 +147,15 @@ def test_files_of_a_recorded_micrologix_1400() -> None:
 def test_files_of_an_emulated_slc() -> None:
     answer = served(*ALL_SLC[:3], ('PTO:0', 15), *ALL_SLC[3:])
     # Type 1 at byte 69, the length after it, first file at 79: so pycomm3 reads that of a 5/05.
-    assert answer(bytes.fromhex('A1 0E 00 01 22')).data == bytes.fromhex(
-        '00 01 21 01 00 00 00 00 00 00 00 82 04 00')
+    for request in ('A1 0E 00 01 22', 'A2 0E 00 01 00 22', 'A2 0E 00 01 21 01'):
+        assert answer(bytes.fromhex(request)).data == bytes.fromhex(
+            '00 01 21 01 00 00 00 00 00 00 00 82 04 00')
+    assert answer(bytes.fromhex('A1 50 00 01 80')).sts == 0x50  # it ends before
     files = carried_out(steps_of(Processor.SLC_5_03), answer)
     assert {str(entry): entry.elements for entry in files} == {
-        'O0': 2, 'I1': 5, 'S2': 33, 'N7': 90, 'ST20': 2}
+        'O0': 2, 'I1': 5, 'S2': 33, 'N12': 90, 'ST20': 2}
+    files = carried_out(steps_of(Processor.SLC_5_03), served(('B3:0', 4)))
+    assert files == [DataFile(FileType.BINARY, 3, 4)]
 
 
 def test_files_that_reads_find() -> None:
@@ -170,7 +174,7 @@ def test_files_that_reads_find() -> None:
     (1, 69, ('5/03', '5/04', '5/05')), (2, 103, ('ML1100', 'ML1200', 'ML1500'))])
 def test_place_of_the_directory(code: int, own_row: int, names: tuple[str, ...]) -> None:
     """Type and place as pycomm3 reads them on a 5/05 and a MicroLogix 1100."""
-    rows = f'{code:02X} {own_row + 20:02X}00 {14 * "0"} 82 0600 {14 * "0"}'
+    rows = f'{code:02X} {own_row + 30:02X}00 {14 * "0"} 82 0600 {14 * "0"} 83 {18 * "0"}'
     data = bytes(own_row) + bytes.fromhex(rows)
     for name in names:
         files = carried_out(steps_of(Processor(name)), lambda request: Packet(
@@ -201,11 +205,14 @@ def test_strange_replies_are_files_or_a_format_error(processor: Processor,
             return
 
 
-def test_refused_directory_is_a_remote_error() -> None:
-    steps = steps_of(Processor.ML1200)
+@for_all(('sts', 'data', 'error'), [
+    (0x10, b'', RemoteError), (0, bytes(78), FormatError),
+    *((0, bytes(69) + size.ljust(11, b'\0'), FormatError) for size in (b'\1\1\x20', b'\1\x45\0'))])
+def test_directory_that_is_refused_or_odd(sts: int, data: bytes, error: type[Exception]) -> None:
+    steps = steps_of(Processor.SLC_5_03)
     next(steps)
-    with pytest.raises(RemoteError):
-        steps.send(Packet(0, 1, 0x4F, 0x10, 7, b''))
+    with pytest.raises(error):
+        steps.send(Packet(0, 1, 0x4F, sts, 7, data))
 
 
 @for_all(('data', 'sts'), [
@@ -259,12 +266,12 @@ def test_flat_image_is_written_across_slots_or_not_at_all() -> None:
 def test_slc_takes_typed_commands_on_files_that_a_plc5_has_too() -> None:
     """From operating system 303 on; the codes are those of a PLC-5."""
     words = table(SLC, N7_0='01 00 02 00', T4_0='00 20 0A 00 05 00', F8_0='00 00 7A 44',
-                  L10_0='01 00 00 00', I_1_0='05 00')
+                  L10_0='01 00 00 00', I_1_0='05 00', PD12_0=counting(23))
     assert ask(words, '68 00 00 02 00 06 07 00 02 00') == (0, '95 09 42 01 00 02 00')
     assert ask(words, '68 00 00 01 00 0E 04 00 02 01 00') == (0, '93 09 42 05 00')
     assert ask(words, '68 00 00 01 00 06 08 00 01 00') == (0, '96 09 94 08 00 00 7A 44')
     assert ask(words, '67 00 00 01 00 06 07 01 93 09 42 07 00') == (0, '')
     assert words_at(words, 'N7:1') == '07 00'
     for data, ext_sts in (('06 0A 00', '06'), ('06 01 00', '06'), ('06 63 00', '06'),
-                          ('06 07 02', '07')):
+                          ('06 07 02', '07'), ('06 0C 00', '06')):
         assert ask(words, f'68 00 00 01 00 {data} 01 00') == (0xF0, ext_sts)

@@ -22,7 +22,6 @@ from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.families import parse_address
-from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.strings import decode_counted, encode_counted, encode_packed
 from abdf1_ros.pccc.structures import type_fault, write_fault
@@ -153,7 +152,7 @@ def test_bits_across_words() -> None:
     ('N7:0', 'PLC5', 'int16'), ('B3:0', 'PLC5', 'uint16'), ('I:000', 'PLC5', 'uint16'),
     ('O:000', 'PLC5', 'uint16'), ('S:0', 'PLC5', 'uint16'), ('D9:0', 'PLC5', 'bcd16'),
     ('A9:0', 'PLC5', 'uint16'), ('F8:0', 'PLC5', 'float32'), ('L9:0', 'SLC', 'int32'),
-    ('T4:0.ACC', 'PLC5', 'int16'), ('C5:0.ACC', 'PLC5', 'int16'), ('R6:0.LEN', 'PLC5', 'int16'),
+    ('T4:0.ACC', 'PLC5', 'int16'), ('HSC:0.ACC', 'SLC', 'int32'), ('R6:0.LEN', 'PLC5', 'int16'),
     ('ST9:0', 'PLC5', 'string'), ('PD9:0.SP', 'PLC5', 'float32'), ('PD9:0', 'PLC5', 'int16'),
     ('PD9:0.50', 'PLC5', 'int16'), ('PD9:0.SPS', 'SLC', 'int16'), ('MG9:0.ERR', 'PLC5', 'int16'),
     ('BT9:0.RLEN', 'PLC5', 'int16'), ('SC9:0.TIM', 'PLC5', 'int16')])
@@ -178,10 +177,6 @@ def test_string_in_a_plc(text: str, words: str) -> None:
     assert (decode_counted(data), encode_counted(text)) == (text, data)
 
 
-def test_characters_after_the_length_of_a_string_do_not_count() -> None:
-    assert decode_counted(bytes.fromhex('01 00 62 61 64 63').ljust(84, b'\0')) == 'a'
-
-
 @for_all(('text', 'words', 'error'), [
     ('x' * 83, 0, '83 characters, a PLC string has 82'),
     ('5 \u20ac', 0, "character '\u20ac' does not exist in a PLC"),
@@ -195,7 +190,8 @@ def test_string_that_cannot_be_written(text: str, words: int, error: str) -> Non
     assert len(encode_packed('x' * 6, 3)) == 6
 
 
-def test_string_length_that_no_plc_has() -> None:
+def test_string_ends_with_its_length_which_is_at_most_82() -> None:
+    assert decode_counted(bytes.fromhex('01 00 62 61 64 63').ljust(84, b'\0')) == 'a'
     with pytest.raises(FormatError, match='^string length 83 is more than 82$'):
         decode_counted(b'\x53\0' + bytes(82))
     assert len(decode_counted(b'\x52\0' + bytes(82))) == 82
@@ -241,13 +237,6 @@ def test_what_may_be_written_and_what_belongs_to_the_processor(
 def test_fault_says_what_may_be_written() -> None:
     assert str(write_fault(at('SC9:0.TIM'), ValueType.INT16, 1)).endswith('be written: PRE')
     assert str(write_fault(at('MG9:0.0', SLC), ValueType.INT16, 1)).endswith('written: nothing')
-
-
-def test_end_names_what_is_too_much() -> None:
-    reader = Reader(b'abc')
-    reader.byte()
-    with pytest.raises(FormatError, match='^2 bytes too many'):
-        reader.end()
 
 
 @for_all(('type_id', 'size', 'data', 'encoded'), [

@@ -75,7 +75,9 @@ def test_what_is_no_address_or_out_of_range(error: type[Exception], text: str, r
 
 
 def test_file_read_begins_at_the_first_word() -> None:
-    assert ask(table(PLC3, B10_0=counting(4)), '04 00 00 01 00 2C 08 0A 01 02') == (0xF0, '06')
+    memory = table(PLC3, B10_0=counting(4), T_0_CTL=counting(6))
+    for place in ('2C 08 0A 01', '3C 03 00 01 00'):
+        assert ask(memory, f'04 00 00 01 00 {place} 02') == (0xF0, '06')
 
 
 def test_files_are_numbered_in_each_section() -> None:
@@ -107,8 +109,9 @@ def test_timer_is_three_words_of_a_structure() -> None:
     ('01 00 00 01 00 2C 08 0A 00 00', ''), ('01 00 00 01 00 2C 08 0A 00 01', ''),
     ('01 00 00 01 00 2C 08 0A 00 04', ''), ('01 01 00 01 00 2C 08 0A 00 02', ''),
     ('01 00 00 00 00 2C 08 0A 00 02', ''), ('00 00 00 01 00 2C 08 0A 00', ''),
-    ('02 2C 08 0A 00 01 00 01 00', ''), ('68 00 00 01 00 07 00 07 00 01 00', ''),
-    ('26 2C 08 0A 00 FF FF 01 00', ''), ('03 00 00 01 00 0C 08 0A 01 00', '')])
+    ('02 2C 08 0A 00 01 00 01 00', ''), ('02 2C 08 0A 00 01 00 00 00 01', ''),
+    ('68 00 00 01 00 07 00 07 00 01 00', ''), ('26 2C 08 0A 00 FF FF 01 00', ''),
+    ('03 00 00 01 00 0C 08 0A 01 00', '')])
 def test_commands_that_are_malformed_or_lead_nowhere(data: str, ext_sts: str) -> None:
     """The codes of M 8-8 (writes), 8-9 (reads) and 8-10 (bit write)."""
     memory = table(PLC3, B10_0=counting(4))
@@ -163,8 +166,9 @@ def test_floats_have_their_high_word_first_and_each_word_can_be_read_alone() -> 
     memory = table(PLC5, F8_0='00 00 7A 44 00 00 C0 BF')
     assert ask(memory, '01 00 00 04 00 06 08 00 08') == (0, '7A 44 00 00 C0 BF 00 00')
     assert ask(memory, '01 01 00 04 00 06 08 00 04') == (0, '00 00 C0 BF')
-    assert ask(memory, '00 02 00 04 00 06 08 00 20 41 00 01') == (0, '')
-    assert words_at(memory, 'F8:0', 4) == '00 00 7A 44 00 01 20 41'
+    assert ask(memory, '00 01 00 04 00 06 08 00 05 00 20 41 00 01') == (0, '')
+    assert ask(memory, '02 06 08 00 01 00 00 40') == (0, '')
+    assert words_at(memory, 'F8:0', 4) == '05 00 7B 04 00 01 20 41'
     memory = table(PLC5, F8_0='01 00 02 00 03 00 04 00')
     assert ask(memory, '01 00 00 01 00 06 08 00 02') == (0, '02 00')
     assert ask(memory, '01 00 00 01 00 0E 08 00 01 02') == (0, '01 00')

@@ -125,7 +125,7 @@ def _with_fault(identity: Identity, reply: bytes) -> Identity:
     bits, code = word_at(words, 0), word_at(words, 2)
     causes = [text for bit, text in enumerate(_FAULTS) if bits >> bit & 1] or ['S:11 is 0']
     fault = f'major processor fault: {", ".join(causes)}; fault code {code} (S:12)'
-    return replace(identity, inquiry=None, faults=tuple(
+    return replace(identity, faults=tuple(
         fault if text == _UNNAMED_FAULT else text for text in identity.faults))
 
 
