@@ -37,7 +37,8 @@ def command(data: str, cmd: int = 0x0F) -> Packet:
     ('AA 04 07 89 00 00 01 00 FF FF', 'protected typed logical write N7:0 = 1 -1'),
     ('AA 04 08 8A 00 00 00 00 AC 41', 'protected typed logical write F8:0 = 21.5'),
     ('AA 04 0A 91 00 00 90 EE FE FF', 'protected typed logical write L10:0 = -70000'),
-    ('AA 02 05 87 02 01 F4 01', 'protected typed logical write C5:2.PRE = 500'),
+    *((f'AA 02 {code} 02 01 F4 01', f'protected typed logical write {place} = 500')
+      for code, place in (('04 86', 'T4:2.PRE'), ('05 87', 'C5:2.PRE'), ('06 88', 'R6:2.LEN'))),
     ('AA 02 05 87 02 00 00 20', 'protected typed logical write C5:2 = 2000'),
     ('AA 03 07 89 00 00 01 02 03', 'protected typed logical write N7:0 = 01 02 03'),
     ('AB 02 03 85 01 00 08 00 08 00', 'masked write B3:1 mask 0008 = 0008'),

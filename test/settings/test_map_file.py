@@ -33,6 +33,8 @@ import pytest
 from support.cases import for_all
 from support.mappings import cell_of, fault, faults, load_rows, one, row
 
+SLC, PLC5, PLC2, PLC3 = 'SLC', 'PLC5', 'PLC2', 'PLC3'
+
 
 def test_bad_row_is_left_out_and_the_rest_stays() -> None:
     mappings, problems = load_rows(
@@ -164,14 +166,16 @@ def test_row_with_every_column() -> None:
     assert str(mapping.address) == 'N7:10'
 
 
-@pytest.mark.parametrize(('cells', 'family', 'kind'), [
-    ({'PLC_Type': 'PLC-5', 'Type': 'DINT'}, 'PLC5', 'int32'),
-    ({'PLC_Type': 'SLC 5/03', 'Type': 'REAL'}, 'SLC', 'float32'),
-    ({'PLC_Type': 'MicroLogix', 'Type': 'Word'}, 'SLC', 'uint16')])
+@for_all(('family', 'meant'), [
+    ('PLC-5', PLC5), ('SLC 5/03', SLC), ('slc-500', SLC), ('MicroLogix', SLC)])
+@for_all(('kind', 'right'), [
+    ('DINT', 'int32'), ('Long', 'int32'), ('REAL', 'float32'), ('float', 'float32'),
+    ('Word', 'uint16'), ('DWord', 'uint32'), ('INT', 'int16'), ('Bit', 'bool')])
 def test_families_and_types_have_the_names_of_the_field(
-        cells: dict[str, str], family: str, kind: str) -> None:
-    mapping = one(Command='Read', Address='N7:0', **cells)
-    assert (str(mapping.plc_type), mapping.type.value) == (family, kind)
+        family: str, meant: str, kind: str, right: str) -> None:
+    address = 'N7:0/0' if right == 'bool' else 'N7:0'
+    mapping = one(Command='Read', Address=address, PLC_Type=family, Type=kind)
+    assert (str(mapping.plc_type), mapping.type.value) == (meant, right)
 
 
 @for_all(('text', 'reads', 'writes'), [
@@ -447,9 +451,6 @@ def test_what_write_again_is_for_and_a_row_on_demand_cannot_have(
 
 
 # Ranges: what each form of an address means, and that each advice reads back as what it says
-
-
-SLC, PLC5, PLC2, PLC3 = 'SLC', 'PLC5', 'PLC2', 'PLC3'
 
 
 @for_all(('family', 'text', 'first', 'length', 'last'), [

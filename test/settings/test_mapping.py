@@ -16,6 +16,7 @@
 
 from dataclasses import replace
 from enum import Enum
+from pathlib import Path
 import re
 
 from abdf1_ros.pccc.access import Access
@@ -52,6 +53,7 @@ def test_limits_as_text_lose_nothing(text: str, cell: str) -> None:
 def test_period_of_zero_is_not_the_default() -> None:
     assert one(Period='0').period == 0
     assert cell_of(one(Period='0'), 'Period') == '0'
+    assert one(Command='Read', Publish='Change', Deadband='0').deadband == 0
 
 
 def test_function_file_of_a_micrologix_is_no_file_of_that_number() -> None:
@@ -88,11 +90,10 @@ def test_digits_share_no_bit_with_the_status_bits_above_them(
 
 
 def test_columns_are_those_of_the_interface_each_once_and_described() -> None:
-    assert COLUMNS == ('Tag', 'Command', 'Address', 'Station', 'PLC_Type', 'Length', 'Type',
-                       'Topic', 'Period', 'Publish', 'Min', 'Max', 'Word_Order', 'Scale',
-                       'Offset', 'Access', 'Processor', 'Fallback', 'Fallback_After',
-                       'While', 'While_Timeout', 'Confirms', 'Via', 'Description', 'Alarm',
-                       'Deadband', 'Max_Silence', 'Write_Again')
+    shown = [' | '.join((column.name, column.kind.right if column.kind else '', *(
+        ' '.join(command.value for command in commands)
+        for commands in (column.commands, column.idle)))).rstrip(' |') for column in MAP_COLUMNS]
+    assert shown == (Path(__file__).parent / 'expected' / 'columns.txt').read_text().splitlines()
     assert len(BY_NAME) == len(MAP_COLUMNS)
     assert BY_NAME['Processor'].default == USUAL.value
     assert [name for name, column in BY_NAME.items() if not column.description] == []
