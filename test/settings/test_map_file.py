@@ -180,7 +180,8 @@ def test_families_and_types_have_the_names_of_the_field(
 
 @for_all(('text', 'reads', 'writes'), [
     ('Read', True, False), ('Write', False, True), ('ReadWrite', True, True),
-    ('READ', True, False), ('write', False, True), ('R/W', True, True), ('rw', True, True)])
+    ('READ', True, False), ('write', False, True), ('R/W', True, True), ('rw', True, True),
+    ('Read/Write', True, True)])
 def test_command_says_whether_a_row_reads_and_writes(text: str, reads: bool, writes: bool) -> None:
     mapping = one(Command=text)
     assert (mapping.reads, mapping.writes) == (reads, writes)
