@@ -30,7 +30,7 @@ _MONTH = '(?:jan|feb|mar|mär|mrz|apr|may|mai|jun|jul|aug|sep|oct|okt|nov|dec|de
 _TIME = re.compile(
     rf'\d{{1,2}}:\d\d(?::\d\d)?(?: ?[ap]m)?|\d{{1,4}}[./-]\d{{1,2}}[./-]\d{{1,4}}|'
     rf'\d{{1,2}}-\d{{1,2}}|\d{{1,2}}\.?[ -]{_MONTH}\.?(?:[ -]\d+)?|{_MONTH}\.?[ -]\d+',
-    re.IGNORECASE)
+    re.ASCII | re.IGNORECASE)
 _WRAPPED = re.compile(r'="?(?P<formula>[^"]+)"?|\'(?P<text>.+)')
 _ERROR = re.compile(r'#(?:(?:N/A|NV|NAME\?|NOM\?)'
                     r'|(?:DIV/0|REF|VALUE|NULL|NUM|BEZUG|WERT|ZAHL|VALEUR|VALOR)!)')
@@ -44,15 +44,15 @@ def is_spreadsheet_error(text: str) -> bool:
 
 def hint(text: str) -> str:
     """Return the hint that follows the fault of a cell with this content, empty for none."""
+    if _TIME.fullmatch(text):  # also with the ä of a German March
+        return ('; a spreadsheet may have made a date or time of it: give the column the format '
+                '"text", and write the cell again')
     for number, character in enumerate(text, 1):
         if not ' ' <= character <= '~':
             return f'; character {number} is {_name(character)}'
     if match := _WRAPPED.fullmatch(text):
         return ('; signs that only a spreadsheet needs: write '
                 f'{shown(match["formula"] or match["text"])}')
-    if _TIME.fullmatch(text):
-        return ('; a spreadsheet may have made a date or time of it: give the column the format '
-                '"text", and write the cell again')
     return ''
 
 

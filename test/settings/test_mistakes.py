@@ -60,8 +60,9 @@ SPREADSHEET = ('; a spreadsheet may have made a date or time of it: give the col
 
 @for_all(('address', 'expected'), [
     ('07:00:00', FORM + SPREADSHEET), ('7:00 PM', FORM + SPREADSHEET),
-    ('03. May', FORM + SPREADSHEET), ('3-May', FORM + SPREADSHEET),
-    ('Mrz 05', FORM + SPREADSHEET), ('05. Mrz', FORM + SPREADSHEET), ('3-1', FORM + SPREADSHEET),
+    *((f'3-{month}', FORM + SPREADSHEET) for month in (
+        'Jan', 'Feb', 'Mar', 'Mär', 'Mrz', 'Apr', 'May', 'Mai', 'Jun', 'Jul', 'Aug', 'Sep', 'Oct',
+        'Okt', 'Nov', 'Dec', 'Dez')), ('Mrz 05', FORM + SPREADSHEET), ('05. Mrz', FORM + SPREADSHEET), ('3-1', FORM + SPREADSHEET),
     ('05.03.2026', FORM + SPREADSHEET),
     ('"=""N7:0"""', FORM + '; signs that only a spreadsheet needs: write N7:0'),
     ("'N7:0", FORM + '; signs that only a spreadsheet needs: write N7:0'),
@@ -93,8 +94,10 @@ def test_address_that_cannot_be_used(tmp_path: Path, address: str, expected: str
     (f'{HEAD}\n#REF!;x\na,Read,N7:0,1,SLC\n', [
         '!2: this row is one cell; its cells need a comma between them, outside of quotes']),
     (f'{HEAD}\n# N/A stays a comment\n#TODO!\n#N/A yet\na,Read,N7:0,1,SLC\n', []),
-    (f'{HEAD}\na,Read,#NAME?,1,SLC\nb,Read,N7:1,1,SLC\n', [
-        '!2:3: "#NAME?" is what a spreadsheet writes where it has no value']),
+    *((f'{HEAD}\na,Read,{mark},1,SLC\nb,Read,N7:1,1,SLC\n', [
+        f'!2:3: "{mark}" is what a spreadsheet writes where it has no value']) for mark in (
+            '#NAME?', '#NOM?', '#NV', '#DIV/0!', '#REF!', '#VALUE!', '#NULL!', '#NUM!', '#BEZUG!',
+            '#WERT!', '#ZAHL!', '#VALEUR!', '#VALOR!')),
     (f'{HEAD}\na,Read\tN7:0,N7:0,1,SLC\n', [
         r'!2:2 (Command): Item: 1, Command = "Read\tN7:0" should be one of Read, Write, ReadWrite,'
         ' Serve, Heartbeat; character 5 is a tab, which divides no cells here']),
@@ -150,9 +153,9 @@ def test_what_is_told_of_a_map(tmp_path: Path, text: str, expected: list[str]) -
         '2:7 (Publish): Publish has no effect in a Write row']),
     (f'{HEAD},Topic\na,Read,N7:0,1,SLC,/cell/x\n', [
         '2:6 (Topic): Topic "/cell/x" becomes the topic cell/x, below ~/read/ and ~/write/']),
-    (f'{HEAD},Topic\na,Read,N7:0,1,SLC,Füllstand/é\n', [
-        '2:6 (Topic): Topic "Füllstand/é" becomes the topic F_llstand; ROS takes A to Z, digits '
-        'and _: Fuellstand/e in Topic reads better']),
+    (f'{HEAD},Topic\na,Read,N7:0,1,SLC,Füßæøåt/éöäÄÖÜ\n', [
+        '2:6 (Topic): Topic "Füßæøåt/éöäÄÖÜ" becomes the topic F_t; ROS takes A to Z, digits '
+        'and _: Fuessaeoeaat/eoeaeAeOeUe in Topic reads better']),
     (f'{HEAD}\na,Read,T4:0,1,SLC\nb,Read,T4:0.ACC,1,SLC\nc,Read,T4:0/DN,1,SLC\n', [
         '2:3 (Address): T4:0 is the control word of the element; its values are T4:0.PRE, '
         'T4:0.ACC']),
@@ -190,7 +193,8 @@ NO_TOPIC = '!2:7 (While): Item: 1, no good Write, ReadWrite or Serve row has the
     ('level', '"level": the bridge publishes it; name topics whose messages the bridge '
      'gets'),
     ('~/write/lamp', '"~/write/lamp"; did you mean lamp?'),
-    ('lamp_1', '"lamp_1"; did you mean lamp?'), ('door', '"door"')])
+    ('lamp_1', '"lamp_1"; did you mean lamp?'), ('/lamp', '"/lamp"; did you mean lamp?'),
+    ('door', '"door"')])
 def test_requires_that_names_no_write_topic(tmp_path: Path, requires: str, expected: str) -> None:
     told = told_of_map(tmp_path, (
         f'{BEAT}beat,Heartbeat,N10:0,1,SLC,,{requires},1000\nspeed,Write,N7:0,1,SLC,,,\n'
