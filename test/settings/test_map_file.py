@@ -234,8 +234,9 @@ def test_command_says_whether_a_row_reads_and_writes(text: str, reads: bool, wri
      '7 (Type): Item: 1, B3:0/5 can be bool: it is a bit; its word is B3:0'),
     ({'Address': 'T4:0.DN', 'Type': 'int16'}, '7 (Type): Item: 1, T4:0/DN can be bool: it is a '
      'bit; the values of this element are T4:0.PRE, T4:0.ACC'),
-    ({'Address': 'ST9:0', 'Max': '4'},
-     '12 (Max): Item: 1, a string has no Max; leave the cell empty'),
+    *(({'Address': 'ST9:0', column: '4'},
+       f'{number} ({column}): Item: 1, a string has no {column}; leave the cell empty')
+      for number, column in ((11, 'Min'), (12, 'Max'))),
     ({'Address': 'ST9:0', 'Length': '2'}, '6 (Length): Item: 1, a string mapping has Length 1'),
     *(({'Min': '5', 'Max': '4'} | scale, '11 (Min): Item: 1, Min is greater than Max')
       for scale in ({}, {'Scale': '0.1'})),

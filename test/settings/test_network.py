@@ -319,7 +319,8 @@ def test_parameter_has_to_go_with_the_rest_of_the_file(
 
 def test_place_that_is_open_to_other_machines_is_told() -> None:
     places = 'tcp:0.0.0.0:4501', 'tcp:10.0.0.1:9?check=BCC'
-    remarks = network_remarks(Network(share=' '.join(('pty:/tmp/a tcp:127.0.0.2:1', *places))))
+    remarks = network_remarks(Network(
+        share=f'{places[0]} pty:/tmp/a tcp:127.0.0.2:1 {places[1]}'))
     assert [*remarks] == [
         f'Share {place}: every program that reaches {place[4:].split("?")[0]} over the network '
         'can send commands to the PLC, without a password' for place in places]
