@@ -93,7 +93,8 @@ def test_rules_1_and_12_nobody_else_writes_the_words_whatever_their_name(
     {'Address': 'D10:1'}, {'Address': 'N11:0', 'PLC_Type': 'SLC'}, {'Address': 'F8:0'},
     {'Address': 'D9:0', 'PLC_Type': 'SLC'},
     {'Address': '000', 'PLC_Type': 'PLC2', 'Access': 'CIF'},  # file 7 or 9
-    {'Command': 'Serve', 'Address': 'N10:0'}])
+    *({'Address': 'N10:0'} | other for other in (
+        {'Command': 'Serve'}, {'Command': 'Read'}, {'Station': '2'}))])
 def test_rules_1_and_12_other_words(cells: dict[str, str]) -> None:
     assert tags_of(row(**BEAT), row(**{'Tag': 'other', 'Command': 'Write'} | cells)) == [
         'beat', 'other']
@@ -129,11 +130,6 @@ def test_rule_1_file_with_a_meaning_is_no_place_to_count(address: str) -> None:
     assert any('take a word of its own in an N or B file, such as N7:0' in text
                for text in found), found
     assert found[0].startswith('2:3 (Address): Item: 1, ')
-
-
-def test_rule_1_words_of_another_station_are_others() -> None:
-    assert tags_of(row(**BEAT), row(Tag='b', Command='Write', Address='N10:0', Station='2'),
-                   row(Tag='c', Command='Read', Address='N10:0')) == ['beat', 'b', 'c']
 
 
 def test_rule_3_requires_topics_with_a_time() -> None:
