@@ -160,9 +160,9 @@ def test_what_is_told_of_a_map(tmp_path: Path, text: str, expected: list[str]) -
         'T4:0.ACC']),
     (f'{HEAD},Length\na,Read,C5:0,1,PLC5,6\n', []),
     (f'{HEAD},Length\na,Read,T4:0.PRE,1,SLC,2\n', []),
-    (f'{HEAD},Length\na,Read,T4:1.ACC,1,SLC,8\n', [
-        '2:6 (Length): 8 words from T4:1.ACC on are also the control word T4:2; whole elements '
-        'are T4:1, and Length 12']),
+    (f'{HEAD},Length\na,Read,T4:1.ACC,1,SLC,7\n', [
+        '2:6 (Length): 7 words from T4:1.ACC on are also the control word T4:2; whole elements '
+        'are T4:1, and Length 9']),
     (f'{HEAD},Length,Processor\na,Read,HSC:0.LPO,1,SLC,2,ML1400\n', [
         '2:6 (Length): 2 words from HSC:0.LPO on are also the control word HSC:1']),
     (f'{HEAD}\na,Write,T4:0/DN,1,SLC\nb,Write,C5:0/CU,1,SLC\nc,Serve,C5:0/CU,5,PLC5\n'
