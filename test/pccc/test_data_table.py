@@ -20,7 +20,7 @@ from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile, OutOfRange
 from abdf1_ros.pccc.dialect import Dialect, Transfer
-from abdf1_ros.pccc.extent import Extent
+from abdf1_ros.pccc.extent import Extent, OUR_TABLE
 from abdf1_ros.pccc.families import dialect_of, FAMILIES, parse_address
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.processor import Processor
@@ -127,6 +127,7 @@ def test_words_of_a_broadcast_meet_those_of_every_station_from_either_side() -> 
         assert Extent(one, area, 0, 2).meets(Extent(other, area, 1, 3))
         assert not Extent(one, area, 0, 2).meets(Extent(other, area, 2, 3))
         assert not Extent(one, area, 0, 2).holds(Extent(other, area, 0, 1))
+    assert not Extent(BROADCAST, area, 0, 2).meets(Extent(OUR_TABLE, area, 0, 2))
 
 
 # Every dialect against the emulated PLC that it is for

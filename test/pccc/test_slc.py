@@ -206,7 +206,7 @@ def test_strange_replies_are_files_or_a_format_error(processor: Processor,
 
 
 @for_all(('sts', 'data', 'error'), [
-    (0x10, b'', RemoteError), (0, bytes(78), FormatError),
+    (0x10, b'', RemoteError), (0, bytes(69) + b'\1\x59' + bytes(7), FormatError),
     *((0, bytes(69) + size.ljust(11, b'\0'), FormatError) for size in (b'\1\1\x20', b'\1\x45\0'))])
 def test_directory_that_is_refused_or_odd(sts: int, data: bytes, error: type[Exception]) -> None:
     steps = steps_of(Processor.SLC_5_03)

@@ -25,6 +25,7 @@ from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor, USUAL
 from abdf1_ros.pccc.values import ValueType, WordOrder
 from abdf1_ros.settings.columns import BY_NAME, COLUMNS, MAP_COLUMNS
+from abdf1_ros.settings.heartbeats import While
 from abdf1_ros.settings.mapping import Command, Mapping, Publish
 from abdf1_ros.settings.names import MAX_LENGTH, sanitise
 from abdf1_ros.settings.rows import Rows
@@ -51,9 +52,8 @@ def test_limits_as_text_lose_nothing(text: str, cell: str) -> None:
 
 
 def test_period_of_zero_is_not_the_default() -> None:
-    assert one(Period='0').period == 0
-    assert cell_of(one(Period='0'), 'Period') == '0'
-    assert one(Command='Read', Publish='Change', Deadband='0').deadband == 0
+    row = one(Command='Read', Publish='Change', Period='0', Deadband='0')
+    assert (row.period, cell_of(row, 'Period'), row.deadband) == (0, '0', 0)
 
 
 def test_function_file_of_a_micrologix_is_no_file_of_that_number() -> None:
@@ -72,10 +72,16 @@ def test_rows_share_words_of_equal_numbers_or_what_is_not_known(
     assert one.shares_words(other) is other.shares_words(one) is is_shared
 
 
-def test_stations_are_those_of_the_plcs() -> None:
-    rows = [make_mapping(command=command, station=station) for command, station in (
-        ('Write', 255), ('Serve', 5), ('Read', 2), ('Write', 1), ('Read', 2))]
-    assert Rows(rows).stations == (2, 1)
+def test_groups_of_rows_and_the_stations_of_the_plcs() -> None:
+    rows = Rows(make_mapping(command=command, station=station, condition=condition)
+                for command, station, condition in (
+        ('Write', 255, None), ('Serve', 5, None), ('Read', 2, None), ('Write', 1, None),
+        ('Read', 2, While(('RUN',))), ('ReadWrite', 3, None), ('Heartbeat', 4, While(('a',), 9))))
+    assert rows.stations == (2, 1, 3, 4)
+    assert {name: [row.station for row in getattr(rows, name)] for name in (
+        'served', 'published', 'messages', 'written', 'own', 'heartbeats', 'guarded')} == {
+        'served': [5], 'published': [5, 2, 2, 3], 'messages': [255, 5, 1, 3],
+        'written': [255, 1, 3, 4], 'own': [4], 'heartbeats': [4], 'guarded': [2]}
 
 
 @for_all(('text', 'kind', 'is_shared'), [
@@ -118,14 +124,10 @@ def test_accesses_stand_in_their_order(plc_type: PlcType) -> None:
     ('a-b', 'a_b'), ('a b', 'a_b'), ('Tank.Level', 'Tank_Level'), ('Füllstand', 'F_llstand'),
     ('cell/2/guard', 'cell/t2/guard'), ('a//b', 'a/b'), ('/a/', 'a'), ('a / b', 'a/b'),
     ('__a__b__', 'a_b'), ('_hidden', 'hidden'), ('~private', 'private'), ('{node}', 'node'),
-    ('a:::b', 'a_b'), ('a/_/b', 'a/b'), ('0', 't0'), ('_7', 't7'), ('CamelCase', 'CamelCase')])
+    ('a:::b', 'a_b'), ('a/_/b', 'a/b'), ('0', 't0'), ('_7', 't7'), ('CamelCase', 'CamelCase'),
+    *((text, '') for text in ('', '_', '__', '/', '///', ':', 'ü', '日本', ' - / - '))])
 def test_name_of_a_text(text: str, name: str) -> None:
     assert sanitise(text) == name
-
-
-@for_all('text', ['', '_', '__', '/', '///', ':', 'ü', '日本', ' - / - '])
-def test_nothing_is_left_of_text_without_letter_or_digit(text: str) -> None:
-    assert sanitise(text) == ''
 
 
 def test_longest_name_fits_with_namespace_and_node_into_what_dds_takes() -> None:
