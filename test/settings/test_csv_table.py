@@ -149,7 +149,9 @@ LONG = 'x' * 100
         'FILE:1:6: unknown column "Wx8"']),
     ('Tag,Length,Lengths\n', [
         'FILE:1:3: unknown column "Lengths"; known: Tag, Address, Length']),
-    ('Tag,Length,Note\n', ['FILE:1:3: unknown column "Note"; known: Tag, Address, Length']),
+    ("Tag,Length,'x,Note\n", [
+        'FILE:1:3: unknown column "\'x"; signs that only a spreadsheet needs: write x',
+        'FILE:1:4: unknown column "Note"; known: Tag, Address, Length']),
     ('Tag,tag,Lenght,TAG\na,b,c,d\n', [
         'FILE:1:2: column Tag stands twice, first in cell 1',
         'FILE:1:3: unknown column "Lenght"; did you mean Length?',
