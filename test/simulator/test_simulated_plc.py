@@ -331,7 +331,6 @@ def test_noise_damages_its_share(plc: SimulatedPlc) -> None:
     assert 900 < len(damaged) < 1100
     assert set(damaged) == {1 << bit for bit in range(8)}
     plc.faults = InjectedFaults(noise=1.0)
-    assert all(plc.damaged(frames.ACK))
     assert plc.damaged(frames.ACK) != frames.ACK
 
 
