@@ -24,13 +24,13 @@ import pytest
 from support.cases import for_all
 
 PLC5, SLC = PlcType.PLC5, PlcType.SLC
-FUNCTION = ('HSC', 'PTO', 'PWM', 'STI', 'EII')
+FUNCTION = ('HSC', 'PTO', 'PWM', 'STI', 'EII')  # numbered in this order
 
 
 @for_all(('letters', 'file'), [
     ('O', 0), ('I', 1), ('S', 2), ('B', 3), ('T', 4), ('C', 5), ('R', 6), ('N', 7), ('F', 8),
     ('ST', None), ('A', None), ('D', None), ('L', None), ('PD', None), ('MG', None),
-    ('BT', None), ('SC', None)])
+    ('BT', None), ('SC', None), *((letters, file) for file, letters in enumerate(FUNCTION))])
 def test_default_files_are_those_of_the_specification(letters: str, file: int | None) -> None:
     assert FileType(letters).default_file == file
 
@@ -203,10 +203,9 @@ def test_files_that_are_missing(names: str, letters: set[str]) -> None:
 
 def test_files_of_a_micrologix_1000_are_fixed() -> None:
     kinds = {file: {kind.value for kind in SLC_FILES} - missing('ML1000', file)
-             for file in range(10)}
+             for file in range(11)}
     assert kinds == {0: {'O'}, 1: {'I'}, 2: {'S'}, 3: {'B'}, 4: {'T'}, 5: {'C'}, 6: {'R'},
-                     7: {'N'}, 8: set(), 9: set()}
-    assert not Processor.ML1000.has_file(10, FileType.INTEGER)
+                     7: {'N'}, 8: set(), 9: set(), 10: set()}
 
 
 def test_only_old_processors_may_lack_the_masked_write() -> None:

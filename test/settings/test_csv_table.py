@@ -139,8 +139,8 @@ LONG = 'x' * 100
 
 @for_all(('content', 'problems'), [
     # The header.
-    ('# c\nTag,Adrs\na,1,5\n', ['FILE:2:2: unknown column "Adrs"; did you mean Address?',
-                                 f'FILE:3:3: {OUTSIDE}']),
+    ('# c\nTag,Adrs\na,1,5\n', [
+        'FILE:2:2: unknown column "Adrs"; did you mean Address?', f'FILE:3:3: {OUTSIDE}']),
     ('Zq9,Tag\n1,a\n', ['FILE:1:1: unknown column "Zq9"; known: Tag, Address, Length']),
     ('Adress,Zq9,,Tag,Lenght,Wx8\n', [
         'FILE:1:1: unknown column "Adress"; did you mean Address?',

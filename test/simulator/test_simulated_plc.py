@@ -32,7 +32,7 @@ from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.simulator.commands import CommandError, execute
-from abdf1_ros.simulator.gateway import SimulatedGateway, stations_of
+from abdf1_ros.simulator.gateway import stations_of
 from abdf1_ros.simulator.ladder import Ladder
 from abdf1_ros.simulator.simulated_plc import COLUMNS, InjectedFaults, load_plcs, SimulatedPlc
 import pytest
@@ -422,7 +422,6 @@ def test_plcs_behind_a_gateway_are_one_station_of_the_line(tmp_path: Path) -> No
                 '2,SLC,N7:0,,,,,10', '3,SLC,N7:0,,,,,', '4,SLC,N7:0,,,,,11')
     direct, gateway, other = stations_of(plcs, Checksum.CRC)
     assert direct is plcs[2]
-    assert isinstance(gateway, SimulatedGateway)
     for plc in plcs[:2]:
         identify = Packet(plc.station, 5, 0x06, 0, plc.station, b'\x03')
         frame = Frame(identify.encode(), 10)
@@ -519,6 +518,7 @@ def test_counters_are_told(plcs: list[SimulatedPlc]) -> None:
       for text in ('much', '-0.1', '1.1', 'nan')),
     *((f'error 1 {text}', f'error 1 {text}: "{text}" should be a byte in hexadecimal such as 0B')
       for text in ('zz', '5', '500000', '\u0661\u0661')),
+    ('mode 1 fast', 'mode 1 fast: the modes are run, program, remote, test, fault'),
     ('msg 1 N7:0 70000', 'msg N7:0: value 70000 at index 0 is not a valid int16')])
 def test_command_that_is_wrong_changes_nothing(
         plcs: list[SimulatedPlc], line: str, text: str) -> None:
