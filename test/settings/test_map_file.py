@@ -415,7 +415,7 @@ def test_processor_chooses_the_dialect(processor: Processor) -> None:
 
 
 def test_slc_without_a_processor_is_taken_for_a_5_03() -> None:
-    mapping = one(PLC_Type='SLC', Address='L10:0', Command='Read')  # or for a MicroLogix
+    mapping = one(PLC_Type='SLC', Address='L10:0', Type='uint32')  # or for a MicroLogix
     assert (mapping.processor, cell_of(mapping, 'Processor')) == (None, '')
     assert mapping.dialect is dialect_of(PlcType.SLC, None, Processor.SLC_5_03)
 

@@ -509,7 +509,8 @@ def test_counters_are_told(plcs: list[SimulatedPlc]) -> None:
     ('silent', 'name a station (1, 12)'), ('silent 3', 'name a station (1, 12)'),
     ('silent 012', 'name a station (1, 12)'), *((line, f'"{line}" is not a command') for line in (
         'hush 1', 'silent 1 2', 'full 1 2', 'counters 1 2', 'power 1 2', 'run 1 2', 'slow 1',
-        'delay 1', 'error 1', 'normal 1 x')),
+        'delay 1', 'error 1', 'normal 1 x', 'scan 1', 'mode 1', 'msg 1 N7:0')),
+    (' msg 1 N7:0 5', '"msg 1 N7:0 5" is not a command'),  # half duplex
     *((f'slow 1 {text}', f'slow 1 {text}: "{text}" should be a whole number from 0')
       for text in ('few', '-3', '1.5', '1_0', '\u0661')),
     *((f'delay 1 {text}', f'delay 1 {text}: "{text}" should be ms from 0 to 3600000')
