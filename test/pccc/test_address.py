@@ -279,8 +279,9 @@ def test_number_after_a_timer_is_no_bit_unless_it_has_a_name(
     ('T4:O.ACC', SLC, 'that is the letter O where a digit should be; write T4:0.ACC'),
     ('RTC:0.HR', SLC, 'RTC is a function file whose type code is not known (S:37 to S:42 may '
                       'show the clock, or 0); let the program copy what is needed into an N file'),
-    ('CS0:4', SLC, 'CS is a function file whose type code is not known; let the program copy what '
-                   'is needed into an N file')])
+    *((f'{name}0:4', SLC, f'{name} is a function file whose type code is not known; let the '
+       'program copy what is needed into an N file') for name in (
+           'BHI', 'CS', 'DAT', 'DLS', 'ES', 'IOS', 'LCD', 'MMI', 'TPI'))])
 def test_what_nothing_supports_and_other_forms_are_told_what_to_write(
         text: str, family: PlcType, expected: str) -> None:
     with pytest.raises(AddressSyntaxError) as fault:

@@ -200,8 +200,8 @@ def test_words_have_the_names_of_their_layout(layout: CounterLayout, names: str)
 
 def test_modem_lines_that_are_on_are_named() -> None:
     assert decode_counters(b'\x1F\0', COUNTERS) == {'modem lines': 'CTS RTS DSR DCD DTR'}
-    assert decode_counters(bytes(30), COUNTERS)['modem lines'] == 'none on'
-    assert [*decode_counters(bytes(30), COUNTERS)][12:] == ['modem lost', 'word 13', 'word 14']
+    assert decode_counters(bytes(30), COUNTERS).items() >= {
+        'modem lines': 'none on', 'word 13': '0', 'word 14': '0'}.items()
     for bit, name in enumerate(('CTS', 'RTS', 'DSR', 'DCD', 'DTR')):
         assert decode_counters(bytes((1 << bit, 0)), COUNTERS) == {'modem lines': name}
 

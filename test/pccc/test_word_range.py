@@ -56,6 +56,7 @@ def test_both_forms_name_the_same_place(text: str, levels: str, shown: str, offs
     ('N7:0/8', 'PLC-3 bits are octal'),
     ('N7:0.ACC', 'words of N files have no members'), ('T:4', 'say which word, as in T:0.ACC'),
     ('T:4.POS', 'POS is not a member; members of T: CTL, PRE, ACC, EN, TT, DN'),
+    ('T:4/2', 'bit 02 of a T element has no name; bits: EN, TT, DN; words: T:0.ACC'),
     ('T:4.3', '3 is not a member'), ('T:4.ACC/DN', 'PLC-3 bits are octal'),
     ('E3.1.8.10.0', 'or E3.1.8.10.0.5'), ('N7:0/DN', 'PLC-3 bits are octal'))),
     *((AddressRangeError, *case) for case in (
@@ -74,12 +75,6 @@ def test_what_is_no_address_or_out_of_range(error: type[Exception], text: str, r
     assert right in str(fault.value)
 
 
-def test_file_read_begins_at_the_first_word() -> None:
-    memory = table(PLC3, B10_0=counting(4), T_0_CTL=counting(6))
-    for place in ('2C 08 0A 01', '3C 03 00 01 00'):
-        assert ask(memory, f'04 00 00 01 00 {place} 02') == (0xF0, '06')
-
-
 def test_files_are_numbered_in_each_section() -> None:
     memory = table(PLC3, B10_0='01 00', N10_0='02 00', O_0='03 00', I_0='04 00')
     assert [ask(memory, f'01 00 00 01 00 0C {section} 02') for section in (
@@ -93,6 +88,8 @@ def test_timer_is_three_words_of_a_structure() -> None:
     assert ask(memory, '01 00 00 01 00 3C 03 00 02 02 02') == (0, '2A 00')
     assert ask(memory, '00 00 00 01 00 3C 03 00 02 01 77 00') == (0, '')
     assert words_at(memory, 'T:2.PRE') == '77 00'
+    longest = '00 00 00 76 00 2C 08 0A 00' + 236 * ' 01'  # 240 with the address
+    assert ask(table(PLC3, B10_0='00 00' * 118), longest) == (0, '')
 
 
 @for_all(('data', 'ext_sts'), [
@@ -103,6 +100,7 @@ def test_timer_is_three_words_of_a_structure() -> None:
     ('01 00 00 01 00 2C 08 0B 00 02', '06'), ('01 00 00 01 00 2C 08 0A 04 02', '06'),
     ('01 00 00 01 00 2C 06 0A 00 02', '06'), ('01 00 00 01 00 2C 0F 0A 00 02', '06'),
     ('01 00 00 01 00 2D 02 08 0A 00 02', '06'),
+    *((f'04 00 00 01 00 {place} 02', '06') for place in ('2C 08 0A 01', '3C 03 00 01 00')),
     ('02 2C 08 0A 04 01 00 00 00', '06'), ('00 00 00 02 00 2C 08 0A 03 01 00 02 00', '07'),
     ('00 00 00 01 00 2C 08 0A 04 01 00', '06'), ('01 00 00 05 00 2C 08 0A 00 02', '09'),
     # malformed, or unknown
@@ -113,8 +111,8 @@ def test_timer_is_three_words_of_a_structure() -> None:
     ('68 00 00 01 00 07 00 07 00 01 00', ''), ('26 2C 08 0A 00 FF FF 01 00', ''),
     ('03 00 00 01 00 0C 08 0A 01 00', '')])
 def test_commands_that_are_malformed_or_lead_nowhere(data: str, ext_sts: str) -> None:
-    """The codes of M 8-8 (writes), 8-9 (reads) and 8-10 (bit write)."""
-    memory = table(PLC3, B10_0=counting(4))
+    """The codes of M 8-8 (writes), 8-9 (reads) and 8-10 (bit write); a file read names no word."""
+    memory = table(PLC3, B10_0=counting(4), T_0_CTL=counting(6))
     assert ask(memory, data) == (0xF0 if ext_sts else 0x10, ext_sts)
     assert words_at(memory, 'B10:0', 4) == '00 00 01 00 02 00 03 00'
 

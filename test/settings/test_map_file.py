@@ -226,8 +226,9 @@ def test_command_says_whether_a_row_reads_and_writes(text: str, reads: bool, wri
       for column in ('Tag', 'Command', 'Address', 'Station', 'PLC_Type')),
     # Cells that do not fit each other.
     ({'Address': 'F8:0', 'Type': 'int16'}, '7 (Type): Item: 1, F8:0 can be float32'),
-    ({'Address': 'B3:0', 'Type': 'string'},
-     '7 (Type): Item: 1, B3:0 can be uint16, int16, bcd16, bcd12, int32, uint32, float32'),
+    *(({'Address': address, 'Type': 'string'},
+       f'7 (Type): Item: 1, {address} can be {types}, bcd12, int32, uint32, float32')
+      for address, types in (('B3:0', 'uint16, int16, bcd16'), ('D9:0', 'bcd16, uint16, int16'))),
     ({'Type': 'bool'}, '7 (Type): Item: 1, N7:0 can be int16, uint16, bcd16, bcd12, int32, '
      'uint32, float32, string; a bool needs a bit address such as B3:0/5'),
     ({'Address': 'B3:0/5', 'Type': 'int16'},

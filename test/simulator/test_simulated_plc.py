@@ -225,14 +225,14 @@ def test_ramp_counts_up_each_period_and_begins_again(path: Path, clock: Clock) -
     assert seen == [(10, 998), (10, 998), (11, 999), (11, 999), (12, 0), (20, 8)]
 
 
-def test_toggle_changes_its_bit_each_period_and_no_other(path: Path, clock: Clock) -> None:
-    plc, = load(path, clock, '1,PLC5,B3:0,1,65535,,', '1,PLC5,B3:0/3,1,0,Toggle,100')
+def test_toggle_changes_its_bits_each_period_and_no_other(path: Path, clock: Clock) -> None:
+    plc, = load(path, clock, '1,PLC5,B3:0,1,65535,,', '1,PLC5,B3:0/3,2,0 1,Toggle,100')
     master = Master(plc)
     seen = []
     for passed in (0.0, 0.1, 0.2, 0.5, 0.7, 0.8):
         clock.now = 50.0 + passed + 0.001
         seen.append(master.number('B3:0'))
-    assert seen == [-9, -1, -9, -1, -1, -9]
+    assert seen == [-9, -17, -9, -17, -17, -9]
 
 
 def test_ramp_of_floats_and_members(path: Path, clock: Clock) -> None:
@@ -420,7 +420,7 @@ def test_power_cycle_keeps_words_and_begins_anew() -> None:
 def test_plcs_behind_a_gateway_are_one_station_of_the_line(tmp_path: Path) -> None:
     plcs = load(tmp_path / 'simulator.csv', Clock(), '1,PLC5,N7:0,,,,,10', '1,PLC5,F8:0,,,,,10',
                 '2,SLC,N7:0,,,,,10', '3,SLC,N7:0,,,,,', '4,SLC,N7:0,,,,,11')
-    direct, gateway, other = stations_of(plcs, Checksum.CRC)
+    direct, gateway, other = stations_of(plcs, Checksum.BCC)
     assert direct is plcs[2]
     for plc in plcs[:2]:
         identify = Packet(plc.station, 5, 0x06, 0, plc.station, b'\x03')
@@ -428,7 +428,7 @@ def test_plcs_behind_a_gateway_are_one_station_of_the_line(tmp_path: Path) -> No
         assert direct.handle(frame) == other.handle(frame) == b''
         assert gateway.handle(frame) == frames.ACK
         reply = plc.serve(identify)
-        assert gateway.handle(Poll(10, True)) == frames.message_frame(reply.encode(), Checksum.CRC)
+        assert gateway.handle(Poll(10, True)) == frames.message_frame(reply.encode(), Checksum.BCC)
         gateway.handle(ACKNOWLEDGED)
     plcs[1].faults.silent = True
     for dst, data, answer, sts in ((10, b'\0\7', b'\7', 0), (10, b'', b'', 0x10), (2, b'', b'', 2),
@@ -436,7 +436,7 @@ def test_plcs_behind_a_gateway_are_one_station_of_the_line(tmp_path: Path) -> No
         command = Packet(dst, 5, 0x06, 0, dst + len(data), data)
         gateway.handle(Frame(command.encode(), 10))
         assert gateway.handle(Poll(10, True)) == frames.message_frame(
-            command.reply(answer, sts).encode(), Checksum.CRC)
+            command.reply(answer, sts).encode(), Checksum.BCC)
         gateway.handle(ACKNOWLEDGED)
 
 
@@ -508,7 +508,7 @@ def test_counters_are_told(plcs: list[SimulatedPlc]) -> None:
 @pytest.mark.parametrize('line, text', [
     ('silent', 'name a station (1, 12)'), ('silent 3', 'name a station (1, 12)'),
     ('silent 012', 'name a station (1, 12)'), *((line, f'"{line}" is not a command') for line in (
-        'hush 1', 'silent 1 2', 'full 1 2', 'counters 1 2', 'power 1 2', 'run 1 2', 'slow 1',
+        'noise 1', 'silent 1 2', 'full 1 2', 'counters 1 2', 'power 1 2', 'run 1 2', 'slow 1',
         'delay 1', 'error 1', 'normal 1 x', 'scan 1', 'mode 1', 'msg 1 N7:0')),
     (' msg 1 N7:0 5', '"msg 1 N7:0 5" is not a command'),  # half duplex
     *((f'slow 1 {text}', f'slow 1 {text}: "{text}" should be a whole number from 0')
