@@ -528,7 +528,8 @@ def test_command_that_expires_before_it_is_given_to_the_port_is_taken_back(embed
     machine.withdraw(6.0)
     assert (told, machine.data_to_send()) == (['expired'], ACK)
     assert machine.sender.send_before == math.inf
-    assert (machine.counters.chars_sent, machine.sender.position) == (len(ACK), len(ACK))
+    sender = machine.sender
+    assert (machine.counters.chars_sent, sender.position, sender.still_here) == (2, 2, 0)
     assert machine.next_call == pytest.approx(6.0 + 1.0 + 0.02)
     machine.handle_timeout(6.05)
     assert machine.data_to_send() == b''
@@ -668,13 +669,13 @@ def test_message_and_response_both_arrive(data: list[int], checksum: Checksum, r
 def test_line_never_waits_for_the_next_portion_nor_runs_far_ahead(checksum: Checksum) -> None:
     frame = message_frame(bytes(range(250)), checksum)
     outgoing = Outgoing(checksum, CHAR_TIME)
-    busy_until = 5.0 + len(outgoing.put(frame, 5.0)) * CHAR_TIME
+    busy_until = 5.0 + len(outgoing.put(frame, 5.0) + outgoing.put(frame, 5.0)) * CHAR_TIME
     while outgoing.due is not None:
         now = outgoing.due
         assert 0.01 < busy_until - now < 0.02
         busy_until += len(outgoing.next(now)) * CHAR_TIME
         assert busy_until - now < 0.06
-    assert busy_until == pytest.approx(5.0 + len(frame) * CHAR_TIME)
+    assert (busy_until, outgoing.size) == (pytest.approx(5.0 + 2 * len(frame) * CHAR_TIME), 0)
 
 
 def test_last_data_and_etx_with_its_check_are_not_divided() -> None:
