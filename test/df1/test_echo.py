@@ -127,7 +127,8 @@ def test_full_duplex_plc_behind_an_adapter_that_echoes_is_heard_but_asks_in_vain
         assert peer.machine.echoes
     # It may be ours, with damage that no check shows.
     assert behind_an_adapter(peer, b'', peer.frame(THEIRS)) == NAK
-    assert peer.served == []
+    peer.start()
+    assert (peer.served, peer.machine.echoes) == ([], False)
 
 
 def test_echo_that_ends_is_forgotten_with_the_next_message() -> None:

@@ -144,14 +144,13 @@ def test_noise_between_symbols_is_skipped_and_its_last_byte_kept() -> None:
     decoder = FrameDecoder(CRC, HALF)
     decoder.feed(b'\x55\xAA' + ACK + b'\x01\x77')
     assert drain(decoder) == [Control(Code.ACK)]
-    assert decoder.last_byte == 0x77
     decoder.feed(b'')
-    assert decoder.last_byte == 0x77
-    decoder.feed(ENQ)
+    assert (decoder.last_byte, decoder.noise) == (0x77, 4)
+    decoder.feed(ENQ + b'\x10')
     assert drain(decoder) == []
     before = decoder.noise
     decoder.feed(Damaged(b'\x66'))
-    assert (decoder.last_byte, decoder.noise) == (0x66, before + 1)
+    assert (decoder.last_byte, decoder.noise) == (0x66, before + 2)
     decoder.feed(b'\x9A' + poll_frame(7))  # the rest of the damaged poll begins nothing
     assert drain(decoder) == [Poll(7, True)]
 
@@ -228,10 +227,10 @@ def test_embedded_response_is_one_in_full_duplex_only(response: bytes) -> None:
 
 def test_reset_forgets_a_message_that_has_begun() -> None:
     decoder = FrameDecoder(CRC, HALF)
-    decoder.feed(message_frame(DATA, CRC)[:-1] + b'\x10')
-    drain(decoder)
+    decoder.feed(message_frame(DATA, CRC)[:-4] + b'\x10')
+    assert (drain(decoder), decoder.in_message) == ([], True)
     decoder.reset()
-    assert (decoder.in_message, decoder.last_byte) == (False, 0)
+    assert (decoder.in_message, decoder.last_byte, decoder.noise) == (False, 0, 2)
     decoder.feed(b'\x06' + message_frame(DATA, CRC))
     assert drain(decoder) == decode(message_frame(DATA, CRC))
 

@@ -92,6 +92,7 @@ def test_silence_counts_from_the_loss_until_the_next_answer() -> None:
     (0, 0, 0), (15, 0, 15), (16, 1, 0), (17, 1, 1), (254, 15, 14)])
 def test_active_node_table_has_a_bit_for_each_station(number: int, word: int, bit: int) -> None:
     stations = ActiveStationList([number])
+    stations[number].overdue = 2  # it answers polls
     table = [0] * 16
     assert stations.words() == table[:word] + [1 << bit] + table[word + 1:]
     stations.lost(number, 0.0)
