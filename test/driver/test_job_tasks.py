@@ -101,12 +101,12 @@ def test_error_ends_the_job_and_says_whether_the_command_was_sent() -> None:
 
 
 def test_all_jobs_end_with_the_port() -> None:
-    jobs, tasks = (TwoRequests(1), TwoRequests(2)), JobTasks(OURS, 0)
+    jobs, tasks = (TwoRequests(1, NOW + 9.0), TwoRequests(2)), JobTasks(OURS, 0)
     first, _ = (job.start(tasks, NOW) for job in jobs)
     first.reply(first.command.reply(b'one'))
     tasks.fail(PortLost('unplugged'))
     assert [str(error) for job in jobs for error in job.errors] == ['port lost: unplugged'] * 2
-    assert tasks.first(()) is None
+    assert (tasks.first(()), tasks.next_expiry) == (None, math.inf)
 
 
 def test_error_in_a_job_ends_it() -> None:

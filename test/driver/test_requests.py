@@ -22,10 +22,12 @@ import threading
 from typing import Any
 
 from abdf1_ros.df1.machine import Machine
+from abdf1_ros.df1.mode import LineMode
 from abdf1_ros.df1.peer import PEER
 from abdf1_ros.df1.radio import RADIO
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave, multidrop, Responder
+from abdf1_ros.df1.slave_link import SLAVE
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.inbox import Inbox
 from abdf1_ros.driver.requests import Requests
@@ -39,6 +41,7 @@ from support.driver_bench import simulated_plc
 from support.virtual_line import VirtualLine
 
 NETWORK = Network(baud=115200, timeout=200, nak_retries=2, enq_retries=2, cmd_timeout=500)
+WRITE = 0x0F, bytes.fromhex('AA 02 07 89 00 00 34 12')
 
 
 @dataclass
@@ -110,16 +113,17 @@ def test_errors_end_only_their_own_request() -> None:
             yield diagnostics.CMD, bytes((diagnostics.ECHO,))
         raise TypeError('a bug')
 
-    bench = Bench()
+    bench = Bench(may_store=True)
     bench.add(9, identify())
-    bench.add(1, broken(0))
     bench.add(1, broken(1))
-    bench.add(1, echo(b'x'))
+    bench.add(1, broken(0))
+    bench.add(1, (write for write in [WRITE]))
     bench.run()
     absent, *bugs = bench.ends.errors
     assert isinstance(absent, StationInactive)
     assert [str(bug) for bug in bugs] == ['a bug', 'a bug']
     assert bench.ends.results == [None]
+    assert bench.requests.counters.commands_sent == 3  # no question, as the PLC has answered
 
 
 @pytest.mark.parametrize(('may_store', 'commands'), [(True, [2, 1, 1, 2]), (False, [1] * 4)])
@@ -128,22 +132,25 @@ def test_rule_26_port_that_may_store_gets_a_question_before_the_first_write_and_
     bench, sent = Bench(may_store=may_store), list[int]()
     for station in (1, 1, 9, 1):
         before = bench.requests.counters.commands_sent
-        bench.add(station, (write for write in [(0x0F, bytes.fromhex('AA 02 07 89 00 00 34 12'))]))
+        bench.add(station, (write for write in [WRITE]))
         bench.run()
         sent.append(bench.requests.counters.commands_sent - before)
     assert (sent, len(bench.ends.results)) == (commands, 3)
 
 
-def test_rule_26_question_also_goes_before_the_next_packet_of_a_write() -> None:
-    requests, ends = Requests(RADIO, NETWORK.line, ActiveStationList(), may_store=True), Ends()
-    requests.add(1, (write for write in 2 * [(0x0F, b'\xAA')]), ends.results.append, print)
+@pytest.mark.parametrize(('mode', 'cmd'), [
+    (RADIO, diagnostics.CMD), (SLAVE, 0x0F)])  # the polls of a master show the connection
+def test_rule_26_question_also_goes_before_the_next_packet_of_a_write(
+        mode: LineMode, cmd: int) -> None:
+    requests, ends = Requests(mode, NETWORK.line, ActiveStationList(), may_store=True), Ends()
+    requests.add(1, (write for write in 2 * [WRITE]), ends.results.append, print)
     requests.add(2, echo(b''), ends.results.append, ends.errors.append)
     write, other = requests.next_task(0.0), requests.next_task(0.0)
     assert write and other
     write.reply(write.command.reply())
     other.fail(StationInactive(2))
     question = requests.next_task(0.0)
-    assert question and (question.command.dst, question.command.cmd) == (1, diagnostics.CMD)
+    assert question and (question.command.dst, question.command.cmd) == (1, cmd)
 
 
 def test_present_station_gets_every_retry_and_an_absent_one_a_single_poll() -> None:
@@ -239,7 +246,9 @@ def test_request_that_waits_for_its_station_ends_with_the_port() -> None:
         requests.add(1, echo(b''), ends.results.append, ends.errors.append)
     requests.machine.wake(0.0)
     requests.machine.stop(PortLost('gone'))
+    requests.machine.start(1.0)
     assert [type(error) for error in ends.errors] == [PortLost] * 2
+    assert requests.machine.data_to_send() == b''
 
 
 SENDERS, ITEMS = 4, 4000

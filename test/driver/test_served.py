@@ -314,7 +314,8 @@ def test_command_for_several_words_is_published_once_and_all_or_nothing() -> Non
     assert plc5.ask(0x0F, beyond) == BAD_WORDS['PLC5']
     assert plc5.heard() == []
     guarded = Bench('PLC5', row('B3:0'), replace(row('B3:1'), is_read_only=True))
-    assert guarded.ask(0x0F, both) == PROTECTED['PLC5']
+    twice = both[:9] + both[1:]  # B3:0, B3:0 again, B3:1
+    assert guarded.ask(0x0F, twice) == PROTECTED['PLC5']
     assert (guarded.read('B3:0', 2), guarded.heard()) == (bytes(4), [])
 
 
@@ -328,11 +329,9 @@ def test_new_files_keep_the_words_of_their_rows() -> None:
 
 
 def test_refused_command_is_undone_in_each_of_its_words() -> None:
-    bench = Bench('SLC', row('B3:0', 'SLC', 3), replace(row('B3:3', 'SLC'), is_read_only=True))
-    assert bench.write('B3:0', 1, 2, 3) == (0, b'')
-    bench.heard()
+    bench = Bench('SLC', words := row('B3:0', 'SLC', 3))
+    bench.served.store(words, [1, 2, 3])
     table = bench.served.table
-    table.changed.clear()
     table.write(bench.place('B3:0'), bytes.fromhex('04 00 05 00 06 00'))
     table.take_back()
     assert bench.read('B3:0', 3) == bytes.fromhex('01 00 02 00 03 00')
