@@ -113,6 +113,7 @@ def test_every_reply_of_long_traffic_fills_its_row() -> None:
     for tns in range(42):
         exchange(bench, tns, 'A2 C8 07 89 00 00', 100 * '05 00 ')
     assert bench.values(mapping) == 42 * [100 * [5]]
+    assert bench.driver.counters.chars_received == 10124
 
 
 def test_two_ports_hear_full_duplex() -> None:
@@ -250,6 +251,7 @@ def test_commands_that_may_have_changed_a_value(station: int, asked: str, cmd: i
     ('SLC', 'N7:0', 0x0F, READ_N7_0, '', 0x10),
     ('SLC', 'N7:0', 0x0F, READ_N7_0, VALUES + ' 00', 0),
     ('SLC', 'N9:0', 0x01, '00 00 04', '01 00 02 00', 0),  # S:2/8 decides which words these are
+    ('SLC', 'N7:0', 0x0F, READ_N7_0, '', 0x02),  # a node on the way says that
     ('PLC5', 'N7:0', 0x0F, '68 00 00 02 00 06 07 00 02 00', '99', 0)])
 def test_refused_read_and_reply_without_known_words_fill_nothing(
         plc: str, text: str, cmd: int, asked: str, answered: str, sts: int) -> None:
@@ -257,11 +259,14 @@ def test_refused_read_and_reply_without_known_words_fill_nothing(
     bench = ListeningBench([mapping])
     exchange(bench, 7, asked, answered, cmd=cmd, sts=sts)
     assert bench.values(mapping) == []
+    heard = int(sts != 0x02)
+    assert (bench.driver.stations[1].replies, bench.driver.tasks.transactions) == (heard, heard)
 
 
 def test_rows_that_no_node_reads_are_named() -> None:
     read, partly, unread = row(length=4), row('N7:2', 4), row('N7:100')
-    bench = ListeningBench([read, partly, unread])
+    rare = make_mapping('N7:200', plc='SLC', period=10_000)  # named after 30 s
+    bench = ListeningBench([read, partly, unread, rare])
     for tns in range(30):
         exchange(bench, tns, READ_N7_0, VALUES)
         bench.run(0.5)
@@ -273,6 +278,15 @@ def test_rows_that_no_node_reads_are_named() -> None:
     carried, = bench.driver.overheard.carried.values()
     assert (carried.station, carried.count, carried.text) == (
         1, 30, 'protected typed logical read N7:0, 4 words')
+
+
+def test_the_200_reads_of_others_that_were_heard_last_are_kept() -> None:
+    bench, _ = listening()
+    for element in (*range(200), 0, 200):
+        exchange(bench, element, f'A2 02 07 89 {element:02X} 00', '05 00')
+    assert bench.driver.overheard is not None
+    kept = [text.rpartition(' N7:')[2] for _, text in bench.driver.overheard.carried]
+    assert sorted(kept) == sorted(f'{element}, 1 word' for element in (0, *range(2, 201)))
 
 
 def test_run_holds_only_from_a_status_reply_that_was_heard() -> None:
@@ -335,7 +349,7 @@ def test_stations_come_and_go_as_they_are_heard() -> None:
 
 
 def test_what_lay_in_a_buffer_while_the_process_stood_still_is_dropped() -> None:
-    bench, mapping = listening()
+    bench, mapping = listening(cmd_timeout=9000)
     bench.hear(frame(command(7, READ_N7_0), 1))
     bench.now += 5.0
     bench.machine.handle_timeout(bench.now)
@@ -344,8 +358,9 @@ def test_what_lay_in_a_buffer_while_the_process_stood_still_is_dropped() -> None
         bench.hear(said, after=0.05)
     assert bench.values(mapping) == []
     bench.run(0.6)
-    exchange(bench, 9, READ_N7_0, VALUES)
-    assert bench.values(mapping) == [[1, 2, 3, 4]]
+    bench.hear(frame(reply(7, VALUES)))  # of before the pause, in which a command may be lost
+    exchange(bench, 9, READ_N7_0, '05' + VALUES[2:])
+    assert bench.values(mapping) == [[5, 2, 3, 4]]
 
 
 def test_what_comes_faster_than_the_line_brings_it_is_old_until_half_a_second_without() -> None:
