@@ -194,6 +194,8 @@ def test_rule_15_row_is_withheld_or_has_failed() -> None:
     assert (point.freshness(9.0), guard.withheld) == (Freshness.WITHHELD, {point})
     point.fail('no reply')
     assert (point.freshness(9.0), guard.withheld) == (Freshness.FAILED, set())
+    point.withhold('its mode is not known', 9.5)
+    assert (point.freshness(9.5), guard.withheld) == (Freshness.WITHHELD, {point})
 
 
 @pytest.mark.parametrize(('condition', 'patience'), [

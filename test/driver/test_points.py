@@ -54,11 +54,11 @@ def test_value_becomes_late_and_then_stale(age: float, freshness: Freshness) -> 
 
 
 def test_value_is_late_after_one_and_a_half_periods_where_periods_are_long() -> None:
-    slow = ReadPoint(make_mapping(), 10.0, 30.0)
-    slow.update(b'\1\0', 0.0)
-    assert slow.freshness(14.9) is Freshness.FRESH
-    assert slow.freshness(15.1) is Freshness.LATE
-    assert slow.freshness(30.1) is Freshness.STALE
+    for stale, ages in ((30.0, (14.9, 15.1, 30.0, 30.1)), (12.0, (11.9, 12.0, 12.1, 12.1))):
+        slow = ReadPoint(make_mapping(), 10.0, stale)
+        slow.update(b'\1\0', 0.0)
+        assert [slow.freshness(age).value for age in ages] == (
+            ['fresh', 'late', 'late', 'stale'] if stale > 15 else 2 * ['fresh'] + 2 * ['stale'])
 
 
 def test_interval_is_between_two_good_reads_without_a_failure() -> None:

@@ -51,6 +51,9 @@ class Unconfirmed:
         self.results: list[WriteResult] = []
         self.line = StillClock(EARLY)
         self.backs = ReadBacks(self.line, PATIENCE, self.results.append)
+        self.add(mapping, values)
+
+    def add(self, mapping: Mapping, values: list[float] | str) -> None:
         write = Write(mapping, values, EARLY)
         lost = write.result(Outcome.UNKNOWN, 'lost', CommandTimeout())
         self.backs.add(write, lost, [self.block])
@@ -127,21 +130,24 @@ def test_read_that_began_before_the_write_ended_says_nothing() -> None:
 def test_read_back_that_does_not_come_ends_when_patience_does() -> None:
     mapping = make_mapping('N7:0', 'ReadWrite')
     unconfirmed = Unconfirmed(mapping, mapping, [5])
-    assert unconfirmed.backs.next_expiry == EARLY + PATIENCE
-    unconfirmed.backs.expire(EARLY + PATIENCE - 0.001)
-    assert unconfirmed.details == []
-    unconfirmed.backs.expire(EARLY + PATIENCE)
-    assert unconfirmed.details == ['lost; not read back within 2 s']
+    unconfirmed.line.now = EARLY + 1.5
+    unconfirmed.add(make_mapping('N7:0', 'Write', tag='later'), [6])
+    for number, end in enumerate((EARLY, EARLY + 1.5)):
+        assert unconfirmed.backs.next_expiry == end + PATIENCE
+        unconfirmed.backs.expire(end + PATIENCE - 0.001)
+        assert len(unconfirmed.details) == number
+        unconfirmed.backs.expire(end + PATIENCE)
+    assert unconfirmed.details == 2 * ['lost; not read back within 2 s']
     assert unconfirmed.backs.next_expiry == math.inf
 
 
 @pytest.mark.parametrize(('text', 'is_overtaken'), [('N7:0', True), ('N7:1', False)])
 def test_newer_write_ends_the_wait_for_the_same_words(text: str, is_overtaken: bool) -> None:
     mapping = make_mapping('N7:0', 'ReadWrite')
-    unconfirmed = Unconfirmed(mapping, mapping, [5])
-    newer = Write(make_mapping(text, 'Write'), [6], EARLY)
-    unconfirmed.backs.write_begins(Claim(1, [newer.mapping.extent], newer))
-    assert unconfirmed.details == ([OVERTAKEN] if is_overtaken else [])
+    for newer in (Write(make_mapping(text, 'Write'), [6], EARLY), None):  # a guest's
+        unconfirmed = Unconfirmed(mapping, mapping, [5])
+        unconfirmed.backs.write_begins(Claim(1, [make_mapping(text).extent], newer))
+        assert unconfirmed.details == ([OVERTAKEN] if is_overtaken else [])
 
 
 def bench_of(text: str = 'N7:0', **cells: int) -> tuple[DriverBench, Mapping]:

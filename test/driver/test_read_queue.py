@@ -101,8 +101,9 @@ def count_for(share: float, period: int) -> int:
 
 def test_earliest_deadline_goes_first() -> None:
     slow, fast, slower = make_job(1000), make_job(100), make_job(2000)
-    queue = make_queue(slow, slower, fast)
-    assert [queue.take(0.0) for _ in range(4)] == [fast, slow, slower, None]
+    free = make_job(0)  # its period counts as four cycles of 97 ms
+    queue = make_queue(slow, slower, free, fast)
+    assert [queue.take(0.0) for _ in range(5)] == [fast, free, slow, slower, None]
     queue.put(slow, 0.5)  # to be read before 1.5
     queue.put(fast, 1.35)  # before 1.45
     queue.put(slower, 0.0)  # before 2.0
@@ -220,7 +221,8 @@ def test_packets_that_took_too_long_together_are_no_value() -> None:
 def test_packet_that_a_call_wants_leaves_the_others_three_times_its_time() -> None:
     long, other = make_job(length=236), make_job()
     long.wanted = 0.0
-    queue, packet, taken = make_queue(other, long), block_time(long.block) / 2, []
+    queue = make_queue(make_job(1000), other, long)
+    packet, taken = block_time(long.block) / 2, []
     for now in (0.0, 3.9 * packet, 4 * packet):
         taken.append(job := queue.take(now))
         queue.put(job, 0.0)
