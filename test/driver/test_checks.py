@@ -109,10 +109,11 @@ def test_status_at_the_start_and_every_period(network: Network, plc: str, proces
     bench, _, (ears,) = make_bench(row, network=network, plc=plc)
     assert bench.driver.checks.known(1).processor == 'unknown (not asked yet)'
     bench.run(3.2 * PERIOD)
-    assert [round(when / PERIOD, 1) for when in ears.times(STATUS)] == [0, 1, 2, 3]
+    first, *_, last = ears.times(STATUS)
+    assert 0.0 <= last - first - 3 * PERIOD < 0.01 + 0.01 * (network is NETWORKS[1])
     known = bench.driver.checks.known(1)
     assert known.processor == processor
-    assert known.told == pytest.approx(ears.times(STATUS)[-1], abs=0.1)
+    assert known.told is not None and 0.0 < known.told - ears.times(STATUS)[-1] < 0.1
     assert bench.driver.stations[1].remote_errors == 0
 
 
@@ -402,13 +403,17 @@ def test_counters_are_read_once_for_each_request_and_never_else(network: Network
 
 def test_counters_that_a_station_refuses_and_those_of_an_absent_station() -> None:
     bench, (plc,), (ears,) = make_bench(word())
-    ears.answer_diagnostics(lambda command: command.reply(sts=0x10))
-    bench.driver.checks.request_counters(1)
-    bench.run(1.0)
-    known = bench.driver.checks.known(1)
-    assert (known.counters, known.no_counters) == (
-        {}, 'STS 10: illegal command, format or length, or the file does not exist')
-    assert bench.driver.checks.counters_wanted == set()
+    for change, reason in (
+            ({'sts': 0x10}, 'STS 10: illegal command, format or length, or the file does not '
+             'exist'), ({'tns': 0}, '2508 ERR_COMMAND_TIMEOUT: Command Timed Out')):
+        ears.answer = lambda command, change=change: (  # type: ignore[misc]
+            command.reply()._replace(**change) if command.data[0] == COUNTERS
+            else plc.serve(command))
+        bench.driver.checks.request_counters(1)
+        bench.run(2.0)
+        known = bench.driver.checks.known(1)
+        assert (known.counters, known.no_counters) == ({}, reason)
+        assert bench.driver.checks.counters_wanted == set()
     bench.driver.checks.request_counters(1)
     bench.run_until(lambda: bool(bench.driver.tasks.under_way) and math.inf in (
         check.due for check in bench.driver.checks.jobs if check.kind is CheckKind.COUNTERS))
