@@ -53,20 +53,6 @@ def test_station_outside_of_the_list_has_a_record_and_no_place_in_it() -> None:
     assert told == []
 
 
-def test_changes_are_told_once() -> None:
-    told: list[tuple[int, bool]] = []
-    stations = ActiveStationList([7], lambda station: told.append(
-        (station.number, station.active)))
-    stations.heard(7, 1.0)
-    assert told == []
-    stations.lost(7, 2.0)
-    stations.lost(7, 3.0)
-    assert told == [(7, False)]
-    stations.heard(7, 4.0)
-    stations.heard(7, 5.0)
-    assert told == [(7, False), (7, True)]
-
-
 def test_station_that_comes_back_twice_without_a_reply_takes_no_commands() -> None:
     stations = ActiveStationList([7])
     found = []
@@ -77,15 +63,19 @@ def test_station_that_comes_back_twice_without_a_reply_takes_no_commands() -> No
     assert found == [False, False, True]
 
 
-def test_silence_counts_from_the_loss_until_the_next_answer() -> None:
-    stations = ActiveStationList([7])
+def test_silence_counts_from_the_loss_until_the_next_answer_and_is_told_once() -> None:
+    told: list[tuple[int, bool]] = []
+    stations = ActiveStationList([7], lambda station: told.append(
+        (station.number, station.active)))
     assert (stations[7].last_heard, stations[7].silent_since) == (None, None)
     stations.heard(7, 1.0)
     stations.lost(7, 2.0)
     stations.lost(7, 3.0)
-    assert (stations[7].last_heard, stations[7].silent_since) == (1.0, 2.0)
+    assert (stations[7].last_heard, stations[7].silent_since, told) == (1.0, 2.0, [(7, False)])
     stations.heard(7, 4.0)
-    assert (stations[7].last_heard, stations[7].silent_since) == (4.0, None)
+    stations.heard(7, 5.0)
+    assert (stations[7].last_heard, stations[7].silent_since) == (5.0, None)
+    assert told == [(7, False), (7, True)]
 
 
 @for_all(('number', 'word', 'bit'), [
@@ -99,20 +89,12 @@ def test_active_node_table_has_a_bit_for_each_station(number: int, word: int, bi
     assert stations.words() == table
 
 
-def test_repeated_message_is_not_accepted() -> None:
+@for_all('other', [{'tns': 0x0103}, {'src': 8}, {'cmd': 0x41}, {'dst': 6}])
+def test_only_the_last_message_counts_as_repeated(other: dict[str, int]) -> None:
     station = Station(7)
-    assert station.note_new(REPLY)
-    assert not station.note_new(REPLY)
-    assert not station.note_new(Packet(5, 7, 0x4F, 0x10, 0x0102, b'other'))
-
-
-@pytest.mark.parametrize('other', [
-    Packet(5, 7, 0x4F, 0, 0x0103), Packet(5, 8, 0x4F, 0, 0x0102), Packet(5, 7, 0x41, 0, 0x0102)])
-def test_only_the_last_message_counts_as_repeated(other: Packet) -> None:
-    station = Station(7)
-    assert station.note_new(REPLY)
-    assert station.note_new(other)
-    assert station.note_new(REPLY)
+    packets = (REPLY, REPLY, REPLY._replace(sts=0x10, data=b'other'),
+               REPLY._replace(**other), REPLY)  # type: ignore[arg-type]
+    assert [station.note_new(packet) for packet in packets] == [True, False, False, True, True]
 
 
 def test_station_may_be_absent_beside_another_that_has_replied() -> None:
@@ -123,12 +105,7 @@ def test_station_may_be_absent_beside_another_that_has_replied() -> None:
 
 
 def test_one_late_reply_is_an_accident_and_two_are_not() -> None:
-    station = Station(7)
-    assert station.replies_in_time
-    station.overdue = 1
-    assert station.replies_in_time
-    station.overdue = 2
-    assert not station.replies_in_time
+    assert [Station(7, overdue=count).replies_in_time for count in range(3)] == [True, True, False]
     assert not Station(7, active=False).replies_in_time
 
 

@@ -328,6 +328,9 @@ def test_reads_of_a_busy_station_are_passed_over_and_stay_due() -> None:
     bench = Bench(one, other)
     assert bench.next_read(0.0, busy={1}) is other
     assert bench.next_read(0.0, busy={1}) is None
+    bench.finish(other, 0.0, 0.0)
+    bench.stations[1].replies = 1  # the other station has not proven that it answers
+    assert bench.reads.next_proven(9.0, busy={1}) == (None, True)
     assert bench.next_read(0.0) is one
 
 

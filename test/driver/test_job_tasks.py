@@ -57,9 +57,9 @@ class TwoRequests(Job):
 
 
 def test_job_is_one_command_after_the_other() -> None:
-    job, tasks = TwoRequests(), JobTasks(OURS, 0x10)
+    job, tasks = TwoRequests(reply_size=20), JobTasks(OURS, 0x10)
     task = job.start(tasks, NOW)
-    assert task.command == Packet(1, OURS, 0x0F, 0, 0x11, b'a')
+    assert (task.command, task.reply_size) == (Packet(1, OURS, 0x0F, 0, 0x11, b'a'), 20)
     assert tasks.first(()) is None  # whoever has started it sends it
     task.sent = True
     task.reply(task.command.reply(b'one'))
@@ -67,16 +67,10 @@ def test_job_is_one_command_after_the_other() -> None:
     assert tasks.take(task, NOW) is task
     assert tasks.first(()) is None
     assert (task.command, task.sent) == (Packet(1, OURS, 0x0F, 0, 0x12, b'b'), False)
+    assert task.reply_size == 0  # that of the first command only is known
     task.reply(task.command.reply(b'two'))
     assert (job.replies, job.errors) == ([b'one', b'two'], [None])
     assert (tasks.transactions, tasks.first(())) == (2, None)
-
-
-def test_size_of_the_reply_is_that_of_the_first_command() -> None:
-    task = TwoRequests(reply_size=20).start(JobTasks(OURS, 0), NOW)
-    assert task.reply_size == 20
-    task.reply(task.command.reply(bytes(20)))
-    assert task.reply_size == 0
 
 
 @for_all('station', [1, BROADCAST])

@@ -21,7 +21,7 @@ from itertools import product
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.write import Outcome, Write, WriteResult
 from abdf1_ros.driver.writes.packets import carry_out, REWRITTEN
-from abdf1_ros.errors import CommandTimeout, LinkError, RemoteError, StationInactive
+from abdf1_ros.errors import CommandTimeout, LinkError, PortLost, RemoteError, StationInactive
 from abdf1_ros.pccc.dialect import Request, Steps
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
@@ -84,7 +84,7 @@ def test_write_of_two_packets(answers: list[Packet | LinkError], outcome: Outcom
     ([reply(sts=0x10), CommandTimeout()], Outcome.UNKNOWN),  # the second may still land
     ([CommandTimeout(), reply(sts=0x10)], Outcome.UNKNOWN),
     ([reply(sts=0x10), reply()], Outcome.PARTLY),
-    ([StationInactive(1), reply()], Outcome.PARTLY)])
+    ([StationInactive(1), reply()], Outcome.PARTLY), ([PortLost('gone')], Outcome.UNKNOWN)])
 def test_own_write_sends_each_packet(answers: list[Packet | LinkError], outcome: Outcome) -> None:
     mapping = make_mapping('N7:0', 'Write', plc='SLC', length=130)
     write = Write(mapping, [7] * 130, 0.0, is_own=True)
