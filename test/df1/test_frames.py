@@ -16,7 +16,7 @@
 
 from typing import Any
 
-from abdf1_ros.df1.checksum import bcc, Checksum, crc16
+from abdf1_ros.df1.checksum import bcc, Checksum
 from abdf1_ros.df1.frames import (
     ACK,
     Code,
@@ -112,11 +112,6 @@ def test_captured_frame_decodes_and_encodes(entry: Captured) -> None:
     assert symbol.station is None
     assert symbol.fault is (FrameFault.TOO_SHORT if entry.checksum is BCC else None)
     assert message_frame(symbol.data, entry.checksum) == entry.frame
-
-
-def test_enq_is_a_symbol_in_full_duplex_only() -> None:
-    assert decode(b'\x10\x05', duplex=FULL) == [Control(Code.ENQ)]
-    assert decode(b'\x10\x05', duplex=HALF) == []
 
 
 def test_master_frame_is_none_in_full_duplex() -> None:
@@ -287,22 +282,10 @@ def test_message_with_a_damaged_character_is_not_a_good_one(at: int) -> None:
     assert good in found
 
 
-def test_crc_check_value_of_the_literature() -> None:
-    assert crc16(b'123456789') == 0xBB3D
-
-
 @for_all(('data', 'value'), [
     ('08 09 06 00 02 04 03', 0xE0), ('08 09 06 00 10 04 03', 0xD2), ('', 0), ('80 80', 0)])
 def test_bcc_of_the_manual(data: str, value: int) -> None:
     assert bcc(bytes.fromhex(data)) == value
-
-
-def test_frames_that_a_micrologix_1400_and_its_software_have_sent() -> None:
-    """From a question in a public forum; of the command the last byte is cut off there."""
-    reply = bytes.fromhex('00014F00FB6F00000000000000FFFF00000000000000FFFF')
-    command = bytes.fromhex('01000F00FB6FA3FFA84FFFAC51FFAE51FF9C4FFF9451FF9651')
-    assert Checksum.CRC.encode(Checksum.CRC.of_message(reply)) == b'\xBE\x07'
-    assert Checksum.CRC.encode(Checksum.CRC.of_message(command)) == b'\x4B\x01'
 
 
 COMMAND = Packet(dst=17, src=5, cmd=0x0F, sts=0, tns=0x0102, data=b'\xA2')
