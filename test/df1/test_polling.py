@@ -22,7 +22,7 @@ import struct
 from typing import Any
 
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import message_frame
+from abdf1_ros.df1.frames import EOT, message_frame
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.polling import COMMANDS_BETWEEN_POLLS
 from abdf1_ros.df1.settings import LinkSettings, PollingSettings
@@ -293,14 +293,17 @@ def test_group_is_filled_with_active_stations() -> None:
 def test_fault_heard_while_probing_is_counted_and_told() -> None:
     rig = bench(PollingSettings((1, 2)), dead=(1,))
     rig.start(1)
-    reply = bytearray(message_frame(Packet(5, 1, 0x4F, 0, 7).encode(), Checksum.CRC))
-    reply[-1] ^= 1
-    while rig.master.machine.log[-1][1] != 'P1':
-        rig.run(0.01)
-    rig.master.machine.receive_data(bytes(reply), rig.clock())
-    assert rig.master.counts()['crc_errors'] == 1
-    assert [number for number, *_ in rig.master.numbers()] == [2506]
-    assert not rig.master.stations[1].active
+    good = message_frame(Packet(5, 1, 0x4F, 0, 7).encode(), Checksum.CRC)
+    for polls, heard in enumerate((good[:-1] + bytes((good[-1] ^ 1,)), good[:8] + EOT + good)):
+        assert not rig.master.stations[1].active
+        while len(rig.master.times('P1')) == polls:
+            rig.run(0.01)
+        rig.master.machine.receive_data(heard, rig.clock())
+        rig.line.wake(rig.master.machine)
+    counts = rig.master.counts()
+    assert (counts['crc_errors'], counts['invalid_messages'], counts['stale_messages']) == (1, 1, 1)
+    assert [number for number, *_ in rig.master.numbers()] == [2506, 2518, 2510]
+    assert rig.master.changes == [(1, True)]
 
 
 def test_command_ends_when_its_station_is_lost_over_a_message_of_another() -> None:
