@@ -198,12 +198,15 @@ def test_reflex_waits_for_the_rest_of_a_divided_message() -> None:
     machine = Machine(run, checksum=Checksum.CRC, timing=LineTiming(0.01), duplex=Duplex.FULL)
     machine.start(0.0)
     sent = machine.data_to_send()
-    assert sent != MESSAGE
+    assert machine.sender.still_here == len(MESSAGE) - len(sent) > 0
     machine.receive_data(ACK, 0.1)
     assert machine.sender.send_before == math.inf  # half a message is never taken back
     sent += machine.data_to_send()
     machine.handle_timeout(9.0)
     assert sent + machine.data_to_send() == MESSAGE + EOT
+    machine.start(20.0)
+    machine.stop()  # nothing is left of the second message
+    assert (machine.next_call, machine.sender.still_here) == (None, 0)
 
 
 def test_procedure_that_does_not_send_its_reflex_is_a_bug_until_the_next_start() -> None:

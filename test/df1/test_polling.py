@@ -190,7 +190,7 @@ def test_last_and_longest_scan_of_each_list_are_known() -> None:
 
 def test_longest_scan_does_not_contain_the_time_without_a_port() -> None:
     rig = bench(PollingSettings((1,)))
-    normal = rig.master.link.status().scans['normal']
+    (_, normal), = rig.master.link.status().scans.items()
     rig.start(run=1.0)
     rig.master.machine.stop(PortLost('unplugged'))
     rig.run(30.0)
@@ -292,10 +292,11 @@ def test_group_is_filled_with_active_stations() -> None:
 
 def test_fault_heard_while_probing_is_counted_and_told() -> None:
     rig = bench(PollingSettings((1, 2)), dead=(1,))
-    rig.start(1)
+    rig.start(1, run=5.0)
     good = message_frame(Packet(5, 1, 0x4F, 0, 7).encode(), Checksum.CRC)
-    for polls, heard in enumerate((good[:-1] + bytes((good[-1] ^ 1,)), good[:8] + EOT + good)):
+    for heard in (good[:-1] + bytes((good[-1] ^ 1,)), good[:8] + EOT + good):
         assert not rig.master.stations[1].active
+        polls = len(rig.master.times('P1'))
         while len(rig.master.times('P1')) == polls:
             rig.run(0.01)
         rig.master.machine.receive_data(heard, rig.clock())

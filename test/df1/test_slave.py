@@ -214,6 +214,12 @@ def test_command_for_a_node_behind_us_is_refused_and_counted() -> None:
     assert bench.counts()['invalid_messages'] == 1
 
 
+def test_broadcast_needs_no_answer_and_so_no_tx_delay() -> None:
+    bench = SlaveBench(SETTINGS, timing=LineTiming(tx_delay=0.5))
+    assert bench.hear(bench.frame(FROM_MASTER, BROADCAST), poll_frame(US)) == b''
+    assert (len(bench.served), said_within(bench, 1.0)) == (1, [(0.5, EOT)])
+
+
 def said_within(bench: SlaveBench, seconds: float) -> list[tuple[float, bytes]]:
     """Return what the slave says by itself, each with the time from now."""
     start, end, said = bench.now, bench.now + seconds, []

@@ -35,8 +35,6 @@ REPLY = Packet(dst=5, src=7, cmd=0x4F, sts=0, tns=0x0102)
 def test_every_station_counts_as_active_at_start() -> None:
     stations = ActiveStationList([9, 3, 3])
     assert [(station.number, station.active) for station in stations] == [(3, True), (9, True)]
-    assert [(station.replies, station.failures, station.remote_errors, station.overdue)
-            for station in stations] == 2 * [(0, 0, 0, 0)]
 
 
 def test_station_outside_of_the_list_has_a_record_and_no_place_in_it() -> None:
@@ -185,7 +183,7 @@ def test_silence_that_was_told_quickly_costs_what_it_took() -> None:
 
 
 def test_where_none_waits_nobody_is_put_off() -> None:
-    stations = ActiveStationList((1, 2), probe_time=1.0)
+    stations = ActiveStationList((1, 2), routes={1: 10, 2: 10}, probe_time=1.0)  # 10 has no rows
     stations.lost(1, 0.0)
     stations.tried(1, 0.0, 1.0, was_silent=False)
     assert stations.probes.next == 8.0
@@ -196,13 +194,18 @@ def test_where_none_waits_nobody_is_put_off() -> None:
 
 
 def test_station_that_replies_too_late_is_silent_and_one_that_is_polled_is_not_asked() -> None:
-    stations = ActiveStationList((1, 2, 3), probe_time=1.0)
+    stations = ActiveStationList((1, 2, 3, 4), routes={4: 2}, probe_time=1.0)
     stations[1].overdue = 2
     stations.tried(1, 3.0, 5.0, was_silent=True)
     assert stations.probes.next == 19.0
     stations.add((2,), are_polled=True)
-    stations.lost(2, 20.0)
+    for lost, polled in ((4, [2]), (2, [2, 4])):  # who answers for 4 shows that it is back
+        stations.lost(lost, 20.0)
+        assert [number for number in (1, 2, 3, 4) if stations.is_polled(number)] == polled
     assert stations.claim_message(1, 20.0) and not stations.claim_message(2, 20.0)
+    for asker, free in ((Asker.IN_TURN, 19.0), (Asker.OWN, 27.0)):
+        stations.tried(2, 19.0, 20.0, was_silent=True, asker=asker)
+        assert stations.probes.next == free
 
 
 def counted(counters: Counters) -> dict[str, int]:

@@ -812,7 +812,7 @@ def test_rule_17_fallback_has_one_result_and_its_retries_have_none() -> None:
     assert cell.results().count(TIMEOUT) == 1
     result = cell.bench.listener.results[-1]
     assert (result.outcome, result.value) == (Outcome.FALLBACK, '[7]')
-    assert result.latency > 3.0
+    assert 3.0 < result.latency < 5.0
 
 
 def test_rule_18_read_only_writes_nothing() -> None:
