@@ -226,12 +226,6 @@ def test_command_that_may_have_waited_while_this_process_stood_still_has_to_come
     assert (peer.hear_packet(THEIRS)[:2], peer.served) == (ACK, [THEIRS])
 
 
-def test_longest_message_is_served() -> None:
-    peer = bench()
-    command = THEIRS._replace(data=b'\x10' * (MAX_LINK_DATA - 6))
-    assert peer.hear_packet(command) == ACK + peer.frame(command.reply())
-
-
 def test_command_with_a_status_is_told_and_not_accepted() -> None:
     peer = bench()
     assert (peer.hear_packet(THEIRS._replace(sts=1)), peer.served) == (NAK, [])
@@ -282,15 +276,6 @@ def test_repetition_of_a_command_whose_reply_was_acknowledged(timeout: float,
         peer.wait(pause)
         assert peer.hear_packet(THEIRS).startswith(ACK)
         assert peer.served.count(THEIRS) == executed
-
-
-def test_error_replies_are_counted() -> None:
-    peer, _ = acknowledged(serve=lambda command: command.reply(b'\x06', 0xF0))
-    assert peer.hear_packet(THEIRS) == ACK + peer.frame(THEIRS.reply(b'\x06', 0xF0))
-    peer.hear(ACK)
-    assert peer.hear_packet(COMMAND.reply(sts=0x10)) == ACK
-    assert peer.counts()['error_messages_sent'] == 1
-    assert peer.counts()['error_messages_received'] == 1
 
 
 @for_all('entry', [

@@ -31,11 +31,10 @@ FROM_MASTER = Packet(US, MASTER, 0x0F, 0, 0x0102, b'\xA2\x01')
 
 
 class Line:
-    """A machine of several slaves, which reply their number, and an STS where one is given."""
+    """A machine of several slaves, which reply their number."""
 
-    def __init__(self, *numbers: int, sts: int = 0) -> None:
+    def __init__(self, *numbers: int) -> None:
         self.served: list[int] = []
-        self._sts = sts
         self.slaves = [HalfDuplexSlave(
             LinkSettings(station=number), lambda command, number=number: self._serve(
                 command, number)) for number in numbers]
@@ -48,7 +47,7 @@ class Line:
 
     def reply(self, command: Packet, number: int) -> Packet:
         """Return what a slave replies."""
-        return command.reply(bytes((number,)), self._sts)
+        return command.reply(bytes((number,)))
 
     def say(self, data: bytes) -> bytes:
         """Put the master's bytes on the line; return what they answer."""
@@ -88,13 +87,6 @@ def test_broadcast_reaches_every_station() -> None:
     assert line.send(FROM_MASTER._replace(dst=BROADCAST)) == b''
     assert line.served == [7, 8]
     assert line.say(master_frame(BROADCAST, FROM_MASTER.encode(), Checksum.CRC)) == b''
-
-
-def test_reply_with_an_error_is_counted_once() -> None:
-    line = Line(7, sts=0x10)
-    line.send(FROM_MASTER)
-    assert [line.say(poll_frame(7)) for _ in range(2)] == [line.frame(FROM_MASTER)] * 2
-    assert line.slaves[0].counters.error_messages_sent == 1
 
 
 def test_withdraw_does_not_touch_replies() -> None:

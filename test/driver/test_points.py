@@ -356,12 +356,6 @@ def test_limits_of_engineering_values(values: list[float] | str, error: str | No
     assert str(caught.value) == error
 
 
-@for_all(('text', 'pulse'), [
-    ('B3:0/1', True), ('T4:0/DN', True), ('N7:0', False), ('B3:0', False), ('F8:0', False)])
-def test_writes_of_bits_are_pulses(text: str, pulse: bool) -> None:
-    assert Write(make_mapping(text, 'Write'), [1], 0.0).is_pulse is pulse
-
-
 def test_result_tells_value_latency_and_request() -> None:
     write = Write(make_mapping(command='Write', length=2), [1, -2], 10.0, 'r7')
     result, = write.result(Outcome.UNKNOWN, 'no reply').of(write.origins, 12.5)
