@@ -95,11 +95,6 @@ def test_nothing_happens_before_start() -> None:
     assert (bench.got, bench.machine.data_to_send(), bench.machine.deadline) == ([], b'', None)
 
 
-def test_deadline_counts_from_the_last_byte_on_the_line() -> None:
-    bench = Bench(Send(FRAME, 1.0), timing=LineTiming(char_time=0.01), start=5.0)
-    assert bench.machine.deadline == pytest.approx(5.0 + 10 * 0.01 + 1.0)
-
-
 def test_line_time_never_runs_ahead_of_the_clock_where_the_line_is_faster_than_set() -> None:
     bench = Bench(*[Send(FRAME, 1.0)] * 101, timing=LineTiming(char_time=0.01))
     for count in range(1, 101):

@@ -137,10 +137,17 @@ def test_command_is_not_repeated_that_has_its_reply_before_the_line_is_quiet() -
 
 
 def test_node_with_our_number_is_told_of_at_the_station_that_it_asks() -> None:
-    bench = Bench()
+    bench, other = Bench(avoids_collisions=True), COMMAND._replace(dst=OTHER)
     bench.wait(11.0)  # until then it may be a packet of the last run
-    bench.hear(framed(COMMAND))
-    assert [event.station for event in bench.events] == [PLC]
+    task = bench.begin(COMMAND)
+    bench.wait(0.3)
+    bench.begin(other)
+    assert bench.wait(0.06) == [framed(other)]  # it does not wait for a reply of the first
+    bench.hear(*2 * [framed(COMMAND)], framed(COMMAND.reply()))  # an echo, and a forwarded copy
+    assert task.result == COMMAND.reply()
+    bench.hear(framed(COMMAND._replace(tns=9)))
+    assert [(event.message.number, event.station) for event in bench.events] == [
+        (2523, PLC), (2510, PLC)]
 
 
 def test_command_that_has_become_too_old_is_not_repeated() -> None:

@@ -256,6 +256,9 @@ def test_what_a_node_on_the_way_says_to_a_guest_says_nothing_about_the_station(
     echo = CommandTask(Packet(1, 9, 0x06, 0, 8, b''), lambda: 0.0)  # the node may execute it
     accounting.complete(echo, echo.command.reply(), keeps_others_waiting=True)
     assert (stations[1].local_status, stations[1].overdue) == ((2, 1) if blames else (0, 0))
+    for now, sts, heard in ((1.0, 0x02, None), (2.0, 0x10, 2.0)):
+        accounting.unexpected(Packet(5, 1, 0x4F, sts, 9), now)
+        assert stations[1].last_heard == heard
 
 
 def test_what_is_told_of_a_nak_names_the_station() -> None:

@@ -84,7 +84,7 @@ def test_rule_11_mode_is_asked_for_though_heartbeats_take_the_whole_line() -> No
     bench.run(30.0)
     told = bench.driver.checks.known(1).told
     assert told is not None and told > bench.clock() - 10.0
-    assert len(bench.listener.times(read)) == 3
+    assert (len(bench.listener.times(read)), bench.driver.spent) == (3, {})  # of messages
 
 
 def test_rule_13_questions_for_the_modes_of_many_plcs_have_their_share_of_a_full_line() -> None:

@@ -314,8 +314,7 @@ def test_command_for_several_words_is_published_once_and_all_or_nothing() -> Non
     assert plc5.ask(0x0F, beyond) == BAD_WORDS['PLC5']
     assert plc5.heard() == []
     guarded = Bench('PLC5', row('B3:0'), replace(row('B3:1'), is_read_only=True))
-    twice = both[:9] + both[1:]  # B3:0, B3:0 again, B3:1
-    assert guarded.ask(0x0F, twice) == PROTECTED['PLC5']
+    assert guarded.ask(0x0F, both[:9] + both[1:]) == PROTECTED['PLC5']  # B3:0 twice, then B3:1
     assert (guarded.read('B3:0', 2), guarded.heard()) == (bytes(4), [])
 
 
