@@ -218,7 +218,7 @@ class FullDuplexPeer(EqualNode):
                     sending, is_answered, expires if sending is message else math.inf,
                     min(self._timeout, answer_within))
             except CommandExpired as error:
-                self._accounting.taken_back(error, was_sent=naks + enqs > 0)
+                self._accounting.taken_back(error, was_sent=naks > 0)
                 raise
             if response in (Code.ACK, Code.STX):
                 break
