@@ -89,7 +89,7 @@ def test_place_has_nothing_of_the_program_before(tmp_path: Path, wake: int) -> N
 
 def test_place_that_a_program_keeps_for_itself_for_ever_is_made_again(
         tmp_path: Path, wake: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    name = str(tmp_path / 'plc')
+    name, files = str(tmp_path / 'plc'), open_files()
     with closing(PtyPlace(name)) as line:
         client, before = os.open(name, os.O_RDWR | os.O_NOCTTY), os.readlink(name)
         with monkeypatch.context() as patch:  # TIOCEXCL, which does not keep out root
@@ -103,6 +103,8 @@ def test_place_that_a_program_keeps_for_itself_for_ever_is_made_again(
         with closing(line.open()) as port:
             exchange(port, client, wake)
         assert os.readlink(name) != before
+        os.close(client)
+    assert not open_files() - files
 
 
 def test_wire_loses_what_no_program_takes(tmp_path: Path, wake: int) -> None:
@@ -132,6 +134,8 @@ def test_wire_that_a_program_keeps_for_itself_for_ever_is_made_again(
             assert port.read(0.0, wake) == b''
         exchange(port, os.open(name, os.O_RDWR | os.O_NOCTTY), wake)
         assert os.readlink(name) != before
+        ours = port.fileno()  # type: ignore[attr-defined]
+        assert not os.get_blocking(ours) and not os.get_inheritable(ours)
 
 
 def test_wire_may_wait_for_its_first_program(tmp_path: Path) -> None:
@@ -177,9 +181,9 @@ def test_name_that_cannot_be_had_leaves_no_terminal_open(
     (tmp_path / 'adapter').symlink_to('/dev/ttyUSB0')
     (tmp_path / 'loop').symlink_to('loop')
     before = open_files()
-    with pytest.raises(OSError, match=text):
+    with pytest.raises(OSError, match=text) as error:
         kind(str(tmp_path / link))
-    assert not open_files() - before
+    assert not open_files() - before, error  # which keeps all from being thrown away
     assert sorted(os.listdir(tmp_path)) == ['adapter', 'loop', 'taken']
 
 

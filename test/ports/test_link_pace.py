@@ -15,6 +15,7 @@
 """When the link thread looks at its port, and when it leaves the port alone."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from itertools import count
 import math
 from pathlib import Path
@@ -24,8 +25,9 @@ from unittest.mock import Mock
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import ACK, Damaged, Frame, FrameFault, message_frame
-from abdf1_ros.df1.machine import LineTiming, Listen, Machine, Rest, Send
+from abdf1_ros.df1.machine import LineTiming, Listen, Machine, Procedure, Rest, Send
 from abdf1_ros.df1.packet import Packet
+from abdf1_ros.errors import CommandExpired
 from abdf1_ros.ports.descriptor import DescriptorPort, READ_SIZE
 from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.ports.settings import PortSettings
@@ -54,9 +56,11 @@ class Paused(NoLine):
 
 
 def test_time_that_is_up_goes_before_bytes_that_lie_in_the_buffer() -> None:
-    script, port = Script(Send(b'command', 1.0)), Paused()
-    Impatient(script.machine, lambda: port, 1, clock=port.clock).run_out()
-    assert script.next() is None
+    script, port, came = Script(Send(b'command', 1.0)), Paused(), list[float]()
+    thread = Impatient(script.machine, lambda: port, 1, clock=port.clock,
+                       on_state=lambda state: came.append(thread.came_after))
+    thread.run_out()
+    assert script.next() is None and came == [0.0, 0.0]
 
 
 class SlowLine(NoLine):
@@ -107,20 +111,26 @@ def test_long_reply_at_a_low_speed_is_heard_to_its_end(char_time: float) -> None
 
 def test_process_that_stops_just_before_it_writes_sends_no_old_command() -> None:
     """The clock is looked at again after all that Python does, right before the write."""
-    script, written = Script(Send(b'command', 1.0, expires=2.0)), list[bytes]()
-    port = Paused()
+    def say(_: Machine) -> Procedure:
+        for expires in (2.0, 61.0):
+            with suppress(CommandExpired):
+                yield Send(b'command', 1.0, expires=expires)
+        yield Rest()
+
+    port, written = Paused(), list[bytes]()
     port.write = written.append  # type: ignore[method-assign]
-    looks = iter([1.0])  # at the start; then the process does not run for a while
-    Impatient(script.machine, lambda: port, 1, clock=lambda: next(looks, 60.0)).run_out()
-    assert 'CommandExpired' in script.end()
-    assert written == [READY]
+    looks = iter([1.0] * 3 + [60.0])  # at the start; then the process does not run, twice
+    Impatient(Machine(say, checksum=Checksum.CRC), lambda: port, 1,
+              clock=lambda: next(looks, 70.0)).run_out()
+    assert written == []
 
 
 class Diary(NoLine):
     """A port that notes what becomes of it, and is lost at the second wait."""
 
-    def __init__(self) -> None:
+    def __init__(self, script: Script) -> None:
         self.notes: list[str] = []
+        self.script = script
 
     def read(self, timeout: float | None, wake: int) -> bytes:
         """Bring an ACK, then nothing any more."""
@@ -134,18 +144,19 @@ class Diary(NoLine):
 
     def close(self) -> None:
         """Note the end."""
-        self.notes.append('close')
+        self.notes.append(f'close, {self.script.ended.qsize()} ended')
 
 
 def test_work_that_can_wait_is_done_when_all_is_sent_and_never_left_undone() -> None:
     script = Script(Send(b'question', PATIENCE), Send(b'thanks'), Send(b'next', PATIENCE))
-    diary = Diary()
+    diary = Diary(script)
     thread = Impatient(script.machine, lambda: diary, 1,
                        while_sending=lambda: diary.notes.append('work'))
     thread.start()
     thread.join()
     assert diary.notes == [
-        'ready', 'question', 'work', 'wait', 'thanks', 'next', 'work', 'wait', 'close', 'work']
+        'ready', 'question', 'work', 'wait', 'thanks', 'next', 'work', 'wait',
+        'close, 1 ended', 'work']
 
 
 def _script_of_a_reply() -> tuple[Script, bytes]:

@@ -48,9 +48,10 @@ def test_machine_runs_on_a_port(pty: Pty, link: Link) -> None:
     thread = link.start(script.machine, pty.name)
     assert link.state() == PortState(True, 'open') == thread.state
     assert pty.read(5) == READY
+    thread.has_turned = False
     pty.write(ACK)
     assert script.next() == Control(Code.ACK)
-    assert pty.read(5) == b'again'
+    assert pty.read(5) == b'again' and thread.has_turned
     pty.write(EOT[:1])
     pty.write(EOT[1:])
     assert script.next() == Control(Code.EOT)

@@ -338,8 +338,8 @@ def test_commands_count_for_whether_there_is_more(ends: Ends, wake: int, stream:
         assert len(port.read(PATIENCE, wake)) in (0, READ_SIZE // 2)
         assert port.has_more
     assert port.read(0, wake) == b'' and not port.has_more
-    server.sendall(b'x')
-    assert port.read(PATIENCE, wake) == b'x'
+    server.sendall(bytes(READ_SIZE - 1))
+    assert port.read(PATIENCE, wake) == bytes(READ_SIZE - 1)
     assert not port.has_more
 
 
