@@ -15,6 +15,7 @@
 """The one way to open a port, a trial before a change, and that a line has one owner."""
 
 from collections.abc import Iterator
+from contextlib import closing
 import os
 from pathlib import Path
 import pty
@@ -27,7 +28,7 @@ from unittest.mock import Mock
 from abdf1_ros.ports import trial
 from abdf1_ros.ports.descriptor import DescriptorPort, Port
 from abdf1_ros.ports.opening import name_port, open_port
-from abdf1_ros.ports.ownership import line_of
+from abdf1_ros.ports.ownership import line_of, own
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.trial import why_not
 from abdf1_ros.problems import ConfigurationError
@@ -69,7 +70,7 @@ def test_scheme_that_nobody_knows_is_no_port(name: str) -> None:
 @pytest.mark.parametrize(('error', 'text'), [
     (OSError('the device server refuses RFC 2217'),
      "[Errno 5] the device server refuses RFC 2217: 'rfc2217://loft:7'"),
-    (OSError(2, 'No such file'), "[Errno 2] No such file: 'rfc2217://loft:7'")])
+    (OSError(2, 'No such file', '/lock'), "[Errno 2] No such file: '/lock'")])
 def test_error_that_gets_the_name_of_the_port_keeps_its_text(error: OSError, text: str) -> None:
     name_port(error, 'rfc2217://loft:7')
     assert str(error) == text
@@ -246,6 +247,8 @@ def test_port_of_a_device_server_has_one_owner_until_he_leaves_it(server: int) -
         with pytest.raises(OSError, match='this program has it open, or has not ended its last'):
             open_port(PortSettings(url))
     port.close()
+    with closing(own(f'127.0.0.1:{server}')), pytest.raises(OSError, match='another program has'):
+        open_port(PortSettings(url))
     open_port(PortSettings(f'SOCKET://127.1:{server}')).close()
 
 
