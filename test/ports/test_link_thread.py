@@ -32,7 +32,7 @@ from abdf1_ros.df1.machine import Listen, Rest, Send, Step
 from abdf1_ros.errors import INTERNAL_ERROR, PortLost
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.descriptor import Port
-from abdf1_ros.ports.link_thread import Attempt, LinkThread, PortState
+from abdf1_ros.ports.link_thread import Attempt, LinkThread, PortKind, PortState
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.wake import Wake
@@ -119,7 +119,8 @@ def test_attempts_to_open_do_not_end_and_are_half_a_second_apart() -> None:
     thread = Impatient(Script().machine, refuse, 4, on_state=states.append)
     thread.run_out()
     assert thread.pauses == [0.5, 0.5, 0.5, 0.5]
-    assert set(states) == {PortState(False, 'cannot open the port: Device or resource busy')}
+    assert {(state, state.kind) for state in states} == {(PortState(
+        False, 'cannot open the port: Device or resource busy'), PortKind.UNAVAILABLE)}
 
 
 def test_descriptors_have_no_limit_of_their_own(pty: Pty, link: Link) -> None:
@@ -474,8 +475,8 @@ def test_machine_that_came_to_nothing_does_not_come_later(monkeypatch: pytest.Mo
     assert port.is_used.wait(PATIENCE)
     assert not thread.exchange(after.machine, lambda: None, reopen=False)
     port.is_used.clear()
-    port.free.set()
     monkeypatch.undo()
+    threading.Timer(0.15, port.free.set).start()
     assert thread.release()
     thread.take()
     assert port.is_used.wait(PATIENCE)  # by whatever machine there is now

@@ -174,7 +174,7 @@ def test_write_waits_for_a_line_that_is_slow(
     def now() -> float:  # is asked for when there is no room
         if not reader.ident:
             reader.start()
-        return 0.0
+        return 100.0
 
     reader = threading.Thread(target=read_all)
     monkeypatch.setattr('abdf1_ros.ports.descriptor.time', Mock(monotonic=now))

@@ -151,6 +151,9 @@ def test_marks_are_undone(marked: bytes, expected: list[bytes]) -> None:
 
 def test_system_doubles_what_looks_like_a_mark(pty: Pty, wake: int) -> None:
     theirs = os.open(pty.name, os.O_RDWR | os.O_NOCTTY)
+    attributes = termios.tcgetattr(theirs)
+    attributes[0] = termios.IGNPAR | termios.ISTRIP | termios.BRKINT
+    termios.tcsetattr(theirs, termios.TCSANOW, attributes)
 
     def opened(stack: ExitStack) -> int:
         stack.callback(os.close, theirs)
@@ -161,9 +164,7 @@ def test_system_doubles_what_looks_like_a_mark(pty: Pty, wake: int) -> None:
     while len(data) < 3:
         data += port.read(PATIENCE, wake)
     assert data == b'\x01\xff\x02'
-    attributes = termios.tcgetattr(theirs)[0]
-    assert attributes & termios.INPCK
-    assert attributes & termios.PARMRK
+    assert termios.tcgetattr(theirs)[0] == termios.INPCK | termios.PARMRK
     port.close()
 
 
@@ -360,7 +361,7 @@ def test_adapters_come_first_with_a_name_that_stays(
     monkeypatch.setattr(listing, 'BY_ID', tmp_path / 'by-id')
     monkeypatch.setattr(listing, 'TTYS', tmp_path)
     monkeypatch.setattr(listing.list_ports, 'comports', lambda: [
-        _port('/dev/ttyAMA0', 'ttyAMA0', 'PNP'), _port('/dev/ttyS0'), _port('/dev/ttyS31'),
+        _port('/dev/ttyAMA0', 'ttyAMA0', 'PNP'), *(_port(f'/dev/ttyS{number}') for number in (0, 31, 7)),
         _port(str(device), 'FT232R USB UART', 'USB VID:PID=0403:6001')])
     first, second, third = listing.serial_ports()
     assert (first.stable, first.adapter, first.may_open) == (str(link), 'FT232R USB UART', True)

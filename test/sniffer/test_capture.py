@@ -76,6 +76,8 @@ def test_it_never_takes_more_than_the_limit(tmp_path: Path) -> None:
     for count in range(200):
         writer.write(capture.Chunk(count / 10, capture.Direction.IN, bytes((count,))))
         assert path.stat().st_size + (old.stat().st_size if old.exists() else 0) <= 992
+    with pytest.raises(OSError, match='is being written by another'):
+        capture.CaptureWriter(path)
     writer.close()
     last = chunks_of(old) + chunks_of(path)
     assert [chunk.data[0] for chunk in last] == list(range(200 - len(last), 200))
@@ -109,6 +111,7 @@ def test_older_capture_is_put_aside(tmp_path: Path) -> None:
 
 
 def test_others_cannot_read_a_capture(tmp_path: Path) -> None:
+    (tmp_path / 'x').touch()
     before = os.umask(0)
     try:
         capture.CaptureWriter(tmp_path / 'x').close()
@@ -153,7 +156,7 @@ def test_other_version_is_refused() -> None:
 
 def test_only_the_beginning_of_a_long_line_is_shown() -> None:
     for lines in (['# abdf1_ros capture' + 'x' * 500], [TEXT.splitlines()[0], 'x' * 500],
-                  [TEXT.splitlines()[0], f'{"9" * 500} > 10']):
+                  *([TEXT.splitlines()[0], f'{sign}{"9" * 300} > 10'] for sign in ('', '-'))):
         with pytest.raises(Problem) as caught:
             list(capture.read_capture('a.cap', lines, {}))
         assert len(str(caught.value)) < 200

@@ -317,7 +317,7 @@ def test_words_of_hexdump_and_od_give_back_their_bytes(data: bytes, offset: str)
 
 @pytest.mark.parametrize(('lines', 'text'), [
     (['0000000 0210', '*', '0000040'], 'use "hexdump -v" or "hexdump -C"'),
-    (['0000000 0210', '0000030 0310'], 'the offset does not follow 2 bytes'),
+    (['0000000 0210', '0000003 0310'], 'the offset does not follow 2 bytes'),
     (['0000000 0210', 'TX 10'], 'is not an offset and words')])
 def test_words_whose_offsets_do_not_fit_are_refused(lines: list[str], text: str) -> None:
     with pytest.raises(Problem, match=text):
@@ -330,7 +330,7 @@ def test_words_whose_offsets_do_not_fit_are_refused(lines: list[str], text: str)
     'TX: 10:06', 'RX 1006 1', 'port 10 06',
     # what would be left over
     '12:00:01.000 TX 10 05 01 FF RX 10 04', 'TX 10 05 01 FF BCC 0A', 'TX: 10 05 01 FF len: 04',
-    'TX10 05 01 FF', 'TX100501FF', '>10 05 01', 'TX 10 5 01 FF', 'RX 10 0 04', 'TX 5 1 FF',
+    'TX10 05 01 FF', 'TX100501FF', '>10 05 01', 'TX 10 5 01 FF', 'RX 10 0 04', 'TX 5 tx FF',
     '12:00:01 10 5 01 FF', 'TX 100501FF 0A', 'TX 100501FF', 'RX 10h 04h', 'RX 0x10|0x04',
     r'RX \x10\x04', r"TX b'\x10\x05' RX b'\x10\x04'", r"TX b'\x10' 06", r"TX b'\x1'", "TX b'AG"])
 def test_what_can_be_read_in_two_ways_is_refused(line: str) -> None:
@@ -344,7 +344,8 @@ def test_characters_that_look_like_bytes_staycharacters() -> None:
                  f'TX   0000  {data.hex(" ")}   {characters(data)}'):
         chunk, = read(iter([line]))
         assert (chunk.data, chunk.direction) == (data, OUT)
-    assert [chunk.data for chunk in read(iter(['TX  41 10 43  A_C']))] == [b'A\x10C']
+    assert [chunk.data for chunk in read(iter(['TX  41 10 43  A_C', 'TX  41 10 20  A_']))] == [
+        b'A\x10C', b'A\x10 ']
 
 
 @for_all('line', [

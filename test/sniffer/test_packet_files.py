@@ -43,7 +43,7 @@ STATUS_TEXT = 'MicroLogix 1400 series B revision 4'
 
 def cip(pccc: bytes, is_reply: bool = False) -> bytes:
     """Return Execute PCCC; the requestor has 7 bytes."""
-    head = bytes.fromhex('CB 00 00 00') if is_reply else bytes.fromhex('4B 02 20 67 24 01')
+    head = bytes.fromhex('CB 00 00 01 34 12') if is_reply else bytes.fromhex('4B 02 20 67 24 01')
     return head + bytes.fromhex('07 4D 00 78 56 34 12') + pccc
 
 
@@ -122,7 +122,7 @@ def exchange(begun: float = 1000.0) -> list[tuple[float, bytes]]:
 
 
 @for_all('content', [
-    pcap(exchange()), pcap(exchange(), order='>'), pcap(exchange(), magic=0xA1B23C4D),
+    pcap(exchange()), pcap(exchange(), order='>'), pcap(exchange(), 0x54000000 + ETHERNET, magic=0xA1B23C4D),
     pcapng(exchange(), '<', b'', 1e6), pcapng(exchange(), '>', b'', 1e6),
     pcapng(exchange(), '<', NANOSECONDS, 1e9, others=1),
     pcapng(exchange()[:1], '>', bytes.fromhex('0009 0001 94000000 00000000'), 2 ** 20)
@@ -140,8 +140,8 @@ def test_packets_that_the_recorder_has_cut_are_told_and_others_read(tmp_path: Pa
     packets = exchange()
     whole = exchange(1001.0)
     others = (1000.0, packets[0][1].replace((44818).to_bytes(2, 'big'), b'\0\x50'))
-    cut = [(time, data[:90]) for time, data in (*packets, others)]
-    with pytest.raises(Problem, match='2 packets cut by the recorder, at 90 bytes: what was in '
+    cut = [(time, data[:90 + at]) for at, (time, data) in enumerate((*packets, others))]
+    with pytest.raises(Problem, match='2 packets cut by the recorder, at 91 bytes: what was in '
                                       'them is missing; record whole packets'):
         chunks_of(tmp_path / 'x', pcap(cut))
     (tmp_path / 'y').write_bytes(pcap(cut + whole))
@@ -187,9 +187,9 @@ def test_segments_are_put_together_and_those_that_come_again_are_dropped(tmp_pat
 
 
 @for_all(('cuts', 'found'), [  # 58 bytes a message; found are messages, and their times
-    ([(0, 30), (90, 200), (30, 60), (60, 90), (200, 232)], ((0, 2), (1, 3), (2, 3), (3, 4))),
-    ([(0, 30), (116, 174), (116, 174), (30, 116), (174, 200), (200, 232), (232, 232)],  # 2 twice
-     ((2, 1), (0, 3), (1, 3), (3, 5))),
+    ([(0, 0), (90, 200), (0, 60), (60, 90), (200, 232)], ((0, 2), (1, 3), (2, 3), (3, 4))),
+    ([(0, 30), (116, 174), (116, 174), (174, 200), (30, 116), (200, 232), (232, 232)],  # 2 twice
+     ((2, 1), (0, 4), (1, 4), (3, 5))),
     ([(0, 30), *((at, at) for at in range(99, 109)), (30, 99), (99, 232)],  # without data
      ((0, 11), (1, 12), (2, 12), (3, 12))),
     ([(0, 30), (58, 200), (200, 232)], ((1, 2), (2, 2), (3, 2)))])  # the rest of 0 is lost
@@ -217,7 +217,7 @@ def test_two_plcs_whose_addresses_end_alike_are_two_stations(tmp_path: Path) -> 
     packets = [(0.0, ethernet(tcp(encapsulated(cip(STATUS)), 1))),
                (0.1, ethernet(tcp(encapsulated(cip(STATUS)), 1, net=7))),
                (0.1, ethernet(tcp(encapsulated(cip(b'\6\0\1\0\3')), 59, net=7))),  # at once
-               (0.2, ethernet(tcp(encapsulated(cip(STATUS_REPLY, True)), 9, False, net=7))),
+               (0.2, ethernet(tcp(encapsulated(cip(STATUS_REPLY[:4], True)), 9, False, net=7))),
                (0.3, ethernet(tcp(encapsulated(cip(STATUS_REPLY, True)), 9, False, net=8)))]
     entries = entries_of(chunks_of(tmp_path / 'x', pcap(packets)))
     assert [(entry.kind, entry.station) for entry in entries if entry.packet] == [
@@ -271,7 +271,7 @@ def test_serial_port_recorded_by_an_rtac_is_read(tmp_path: Path) -> None:
 
 
 @for_all(('content', 'fault'), [
-    (pcap(exchange())[:-5], 'byte 311: the file ends inside a packet'),
+    (pcap(exchange())[:-5], 'byte 313: the file ends inside a packet'),
     (pcap([])[:20], 'byte 20: the file ends inside a packet'),
     (pcap([]) + bytes(7), 'byte 31: the file ends inside a packet'),
     (pcap([]) + struct.pack('<4I', 0, 0, 1 << 30, 0), 'a size of 1073741824 bytes'),
@@ -293,6 +293,7 @@ def test_csp_is_named(tmp_path: Path) -> None:
 
 @for_all('packet', [
     ethernet(tcp(encapsulated(cip(STATUS)), 0).replace(b'\x40\0\x40', b'\x20\0\x40')),  # a part
+    ethernet(tcp(encapsulated(cip(STATUS)), 0).replace(b'\x40\0\x40', b'\0\1\x40')),  # its end
     b'', bytes(14), ethernet(b''), ethernet(bytes(60)), ethernet(tcp(b'', 0)[:30]),
     ethernet(tcp(bytes(100), 0)), ethernet(tcp(encapsulated(b''), 0)),
     ethernet(tcp(encapsulated(bytes.fromhex('4B 02 20 67 24 01')), 0)),
@@ -349,8 +350,9 @@ def test_what_nobody_said_is_no_packet(tmp_path: Path) -> None:
 
 
 def test_time_of_day_that_is_none_counts_from_0(tmp_path: Path) -> None:
-    ack = Entry(None, Direction.OUT, Kind.ACK, wire=b'\x10\x06')
-    assert written(tmp_path / 'x', ack, begun='yesterday')[len(HEAD):][12:20] == bytes(8)
+    for when in (None, -0.5):
+        ack = Entry(when, Direction.OUT, Kind.ACK, wire=b'\x10\x06')
+        assert written(tmp_path / 'x', ack, begun='yesterday')[len(HEAD):][12:20] == bytes(8)
 
 
 def test_only_a_file_of_ours_is_replaced_and_nobody_else_may_read_it(tmp_path: Path) -> None:

@@ -85,7 +85,7 @@ def summary() -> Summary:
     summary = Summary(9600)
     summary.take(Chunk(0.0, OUT, bytes(600)))
     summary.take(Chunk(2.0, IN, bytes(360)))
-    for entry in (COMMAND, REPLY, REFUSAL, DAMAGED, POLL, NOISE,
+    for entry in (replace(POLL, valid=False), COMMAND, REPLY, REFUSAL, DAMAGED, NOISE,
                   Entry(2.0, IN, Kind.SILENCE, station=16)):
         summary.add(entry)
     return summary
@@ -96,11 +96,11 @@ def test_summary_counts_what_was_seen_and_what_was_wrong(summary: Summary) -> No
     assert head == ('summary: 2.0 s, 960 bytes (600 >, 360 <), half duplex, CRC, '
                     'line load 50.0% at 9600 baud')
     assert seen == '  seen: 1 command, 2 replies, 1 of them with an error, 1 poll'
-    assert faults == ('  faults: 1 damaged, 2 bytes of noise, 1 retransmission, '
+    assert faults == ('  faults: 2 damaged, 2 bytes of noise, 1 retransmission, '
                       '1 duplicate, 1 polls and messages without answer')
     assert latency == '  replies after: mean 500.0 ms, max 750.0 ms'
     assert one.split() == ['1', '0', '0', '1', '2', '1', '1', '2', '0', '500.0', '750.0']
-    assert sixteen.split() == ['16', '1', '1', *'000000', '-', '-']
+    assert sixteen.split() == ['16', '1', '1', *'000100', '-', '-']
 
 
 def test_json_has_all_that_the_summary_tells(summary: Summary) -> None:
@@ -108,8 +108,9 @@ def test_json_has_all_that_the_summary_tells(summary: Summary) -> None:
     assert {name: found[name] for name in (
         'kind', 'seconds', 'bytes', 'check', 'duplex', 'baud', 'load', 'errors', 'damaged')} == {
             'kind': 'summary', 'seconds': 2.0, 'bytes': {'>': 600, '<': 360}, 'check': 'CRC',
-            'duplex': 'half', 'baud': 9600, 'load': 0.5, 'errors': 1, 'damaged': 1}
-    assert found['stations']['1']['latency_ms'] == {'mean': 500.0, 'max': 750.0}
+            'duplex': 'half', 'baud': 9600, 'load': 0.5, 'errors': 1, 'damaged': 2}
+    assert [(station, counts['latency_ms']) for station, counts in found['stations'].items()] == [
+        ('1', {'mean': 500.0, 'max': 750.0}), ('16', None)]
     assert found['stations']['16']['counts'] == {'poll': 1, 'silence': 1}
     assert found['marks'] == {'retransmission': 1, 'duplicate': 1}
     nothing = json.loads(summary_json(Summary(), LineKind(None, None)))
