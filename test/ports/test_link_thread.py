@@ -210,22 +210,6 @@ def test_stop_ends_what_runs_with_an_error(pty: Pty, link: Link, step: Step) -> 
     open_port(PortSettings(str(pty.name))).close()
 
 
-def test_stop_while_the_port_is_not_there(tmp_path: Path) -> None:
-    asked = threading.Event()
-
-    def refuse() -> Port:
-        asked.set()
-        raise OSError('no')
-
-    thread = LinkThread(Script().machine, refuse, retry_period=3600.0)
-    thread.start()
-    assert asked.wait(PATIENCE)
-    began = time.monotonic()
-    thread.stop()
-    assert not thread.is_alive()
-    assert time.monotonic() - began < PATIENCE / 2
-
-
 def test_three_faults_within_a_minute_end_the_thread() -> None:
     broken, faults, states = Broken(), list[Exception](), list[PortState]()
     thread = Impatient(broken.machine, NoLine, 100, on_fault=faults.append,

@@ -141,20 +141,6 @@ def test_read_ends_when_woken(sockets: Sockets, pipe: tuple[int, int]) -> None:
     assert sockets[0].read(None, pipe[0]) == b''
 
 
-def test_read_from_a_closed_line(sockets: Sockets, wake: int) -> None:
-    port, other = sockets
-    other.close()
-    with pytest.raises(OSError, match='the other end has closed the connection'):
-        port.read(None, wake)
-
-
-def test_write_to_a_closed_line(sockets: Sockets) -> None:
-    port, other = sockets
-    other.close()
-    with pytest.raises(BrokenPipeError):
-        port.write(b'abc')
-
-
 def test_write_to_a_line_that_takes_no_more_does_not_hang(
         sockets: Sockets, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr('abdf1_ros.ports.descriptor.WRITE_TIMEOUT', 0.05)

@@ -361,7 +361,8 @@ def test_adapters_come_first_with_a_name_that_stays(
     monkeypatch.setattr(listing, 'BY_ID', tmp_path / 'by-id')
     monkeypatch.setattr(listing, 'TTYS', tmp_path)
     monkeypatch.setattr(listing.list_ports, 'comports', lambda: [
-        _port('/dev/ttyAMA0', 'ttyAMA0', 'PNP'), *(_port(f'/dev/ttyS{number}') for number in (0, 31, 7)),
+        _port('/dev/ttyAMA0', 'ttyAMA0', 'PNP'), *map(_port, (
+            '/dev/ttyS0', '/dev/ttyS31', '/dev/ttyS7')),
         _port(str(device), 'FT232R USB UART', 'USB VID:PID=0403:6001')])
     first, second, third = listing.serial_ports()
     assert (first.stable, first.adapter, first.may_open) == (str(link), 'FT232R USB UART', True)

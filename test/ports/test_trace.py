@@ -144,16 +144,6 @@ def test_line_does_not_wait_for_a_disk_that_stands_still(
                       for lost in all_lost]
 
 
-def test_opener_without_a_trace_gives_the_port_itself(tmp_path: Path) -> None:
-    pty = Pty(tmp_path / 'line')
-    opener = PortOpener(PortSettings(str(pty.name)))
-    port = opener.open()
-    assert not isinstance(port, TracedPort)
-    port.close()
-    opener.close()
-    pty.close()
-
-
 def test_opener_records_across_openings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # the clock is asked once for the beginning
     monkeypatch.setattr(trace_module, 'time', SimpleNamespace(monotonic=iter([-1e6]).__next__))
@@ -186,6 +176,7 @@ def test_opener_that_cannot_record_opens_all_the_same(tmp_path: Path) -> None:
     assert errors == [f'{tmp_path}: exists and is not a capture; give another name; '
                       'nothing is recorded']
     port = opener.open()
+    assert not isinstance(port, TracedPort)
     port.write(b'\x01')
     assert pty.read(1) == b'\x01'
     port.close()

@@ -144,11 +144,6 @@ def recording(tmp_path: Path) -> Recording:
     return Recording(path)
 
 
-def test_settings_of_a_capture_are_known_once_it_is_read(recording: Recording) -> None:
-    assert len(list(recording.chunks())) == 2
-    assert recording.settings == {'check': 'BCC'}
-
-
 def test_percent_tells_how_much_has_been_read(recording: Recording) -> None:
     percents = [recording.percent for _ in recording.chunks()]
     assert 0 < percents[0] < percents[1] == 100
@@ -165,11 +160,6 @@ def test_percent_of_a_packed_file_ends_at_100(tmp_path: Path) -> None:
 def test_file_has_a_size_and_a_device_has_none(recording: Recording) -> None:
     assert recording.has_size
     assert not Recording(Path('/dev/zero')).has_size
-
-
-def test_recording_that_is_missing_is_file_not_found(tmp_path: Path) -> None:
-    with pytest.raises(FileNotFoundError):
-        Recording(tmp_path / 'nothing')
 
 
 # Logs: what each form says comes back, or the line is refused

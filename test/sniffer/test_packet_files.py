@@ -122,8 +122,8 @@ def exchange(begun: float = 1000.0) -> list[tuple[float, bytes]]:
 
 
 @for_all('content', [
-    pcap(exchange()), pcap(exchange(), order='>'), pcap(exchange(), 0x54000000 + ETHERNET, magic=0xA1B23C4D),
-    pcapng(exchange(), '<', b'', 1e6), pcapng(exchange(), '>', b'', 1e6),
+    pcap(exchange()), pcap(exchange(), order='>'), pcapng(exchange(), '<', b'', 1e6),
+    pcap(exchange(), 0x54000000 + ETHERNET, magic=0xA1B23C4D), pcapng(exchange(), '>', b'', 1e6),
     pcapng(exchange(), '<', NANOSECONDS, 1e9, others=1),
     pcapng(exchange()[:1], '>', bytes.fromhex('0009 0001 94000000 00000000'), 2 ** 20)
     + block('>', 3, bytes(4)) + pcapng(exchange()[1:], '<', NANOSECONDS, 1e9)])
