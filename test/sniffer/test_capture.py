@@ -63,7 +63,7 @@ def test_guest_is_told_with_the_next_chunk() -> None:
 
 def test_blank_lines_remarks_and_a_second_head_may_stand_anywhere() -> None:
     head, *rest = TEXT.splitlines()
-    text = [head, '', '# port lost', *rest, head, '# check: BCC', '   ', *rest]
+    text = [head, '', '# port lost', '# baud: 9600', *rest, head, '# check: BCC', '   ', *rest]
     settings: dict[str, str] = {}
     assert list(capture.read_capture('x', text, settings)) == CHUNKS * 2
     assert settings == {'baud': '19200', 'check': 'BCC'}

@@ -68,7 +68,8 @@ def test_command_after_the_note_of_a_guest_is_the_guests(talk: Talk) -> None:
 def test_reply_to_nothing_and_to_another_command(talk: Talk) -> None:
     assert talk.back(REPLY).marks == (Mark.STRAY,)
     talk.out(COMMAND)
-    assert talk.back(Packet(5, 1, 0x46, 0, 7)).marks == (Mark.WRONG_COMMAND,)
+    assert [talk.back(Packet(5, 1, 0x46, 0, 7)).marks for _ in range(2)] == [
+        (Mark.WRONG_COMMAND,), (Mark.RETRANSMISSION, Mark.WRONG_COMMAND)]
     assert len(talk.unanswered()) == 1
 
 
@@ -84,8 +85,8 @@ def test_again_without_ack_is_a_retransmission_with_ack_a_duplicate(talk: Talk) 
 
 
 def test_an_ack_is_for_what_went_the_other_way(talk: Talk) -> None:
-    talk.out(Packet(2, 5, 0x0F, 0, 7))
-    talk.out(COMMAND)
+    for dst in (2, COMMAND.dst, 3):
+        talk.out(COMMAND._replace(dst=dst))
     talk.back(Packet(5, 2, 0x0F, 0, 7))
     talk.acknowledge(Direction.OUT)
     assert talk.out(COMMAND).marks == (Mark.RETRANSMISSION,)

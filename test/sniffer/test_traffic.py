@@ -122,7 +122,7 @@ def test_wrong_check_is_marked_and_taken_no_further() -> None:
 def test_repetitions_are_marked() -> None:
     command, reply = (OUT, master(COMMAND)), (IN, message(REPLY))
     ack, answer, poll = (IN, frames.ACK), (OUT, frames.ACK), (OUT, frames.poll_frame(1))
-    entries = decode([command, command, ack, command, ack, poll, reply, poll, reply, answer,
+    entries = decode([command, poll, (IN, frames.EOT), command, ack, command, ack, poll, reply, poll, reply, answer,
                       poll, reply, answer])
     marks = [entry.marks for entry in entries if entry.packet]
     assert marks == [(), (Mark.RETRANSMISSION,), (Mark.DUPLICATE,), (), (Mark.RETRANSMISSION,),
@@ -144,11 +144,12 @@ def test_broadcast_needs_no_answer() -> None:
 
 
 def test_command_without_a_reply_is_told_at_the_end() -> None:
-    entries = decode([(OUT, master(COMMAND)), (IN, frames.ACK), (OUT, frames.poll_frame(1)),
-                      (IN, frames.EOT)])
-    assert (entries[-1].kind, entries[-1].station, entries[-1].text) == (
-        Kind.UNANSWERED, 1, f'5 to 1, TNS 1234: {WORDS}')
-    assert entries[-1].time == pytest.approx(0.03)
+    for pause in (0.01, 4.0):  # also when it has waited for too long
+        entries = decode([(OUT, master(COMMAND)), (IN, frames.ACK), (OUT, frames.poll_frame(1)),
+                          (IN, frames.EOT)], pause=pause)
+        assert (entries[-1].kind, entries[-1].station, entries[-1].text) == (
+            Kind.UNANSWERED, 1, f'5 to 1, TNS 1234: {WORDS}')
+        assert entries[-1].time == pytest.approx(3 * pause)
 
 
 def test_full_duplex_traffic_is_told_in_both_directions() -> None:
@@ -164,8 +165,9 @@ def test_full_duplex_traffic_is_told_in_both_directions() -> None:
     assert [entry.text for entry in entries[4:6]] == [
         'refuses the message', 'asks for the last answer']
     assert [entry.station for entry in entries if entry.packet] == [1, 1, 5, 5]
-    entries = decode(one_wire([(OUT, message(COMMAND)), (IN, frames.ACK), (IN, whole)]))
-    assert [entry.direction for entry in entries] == [UNKNOWN] * 3
+    entries = decode(one_wire([*2 * [(OUT, message(COMMAND)), (IN, frames.ACK)], (IN, whole)]))
+    assert [entry.direction for entry in entries] == [UNKNOWN] * 5
+    assert entries[2].marks == (Mark.DUPLICATE,)
 
 
 # Full duplex with CRC, as public pages print what real processors said: triplc.com, forum topic
