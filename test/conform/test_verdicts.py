@@ -571,10 +571,6 @@ def test_symbol_that_begins_late_is_heard_to_its_end() -> None:
 LINK_DATA = bytes.fromhex('08 09 06 00 10 04 03')
 
 
-def test_crc_has_the_check_value_of_its_polynomial() -> None:
-    assert codec.crc(b'123456789') == 0xBB3D
-
-
 @for_all(('frame', 'printed'), [
     (codec.message(LINK_DATA, BlockCheck.BCC), '10 02 08 09 06 00 10 10 04 03 10 03 D2'),
     (codec.master_message(0x20, LINK_DATA, BlockCheck.BCC),

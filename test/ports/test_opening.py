@@ -92,20 +92,18 @@ def test_device_that_opens_is_left_free(monkeypatch: pytest.MonkeyPatch) -> None
     assert why_not(settings, 10.0) == ''
     port = open_port(settings)
     assert why_not(settings, 10.0) == 'another program has it open'
+    assert why_not(PortSettings('/dev/ttyS_none'), 10.0) == 'No such file or directory'
     port.close()
     os.close(slave)
     os.close(master)
 
 
-def test_device_that_is_not_there_is_a_reason() -> None:
-    assert why_not(PortSettings('/dev/ttyS_none'), 10.0) == 'No such file or directory'
-
-
-@pytest.mark.parametrize(('error', 'expected'), [
-    (socket.gaierror(socket.EAI_NONAME, 'Name or service not known'), 'Name or service not known'),
-    (socket.gaierror(socket.EAI_AGAIN, 'Temporary failure in name resolution'), '')])
+@pytest.mark.parametrize(('scheme', 'error', 'expected'), [
+    ('socket', socket.gaierror(socket.EAI_NONAME, 'Name or service not known'),
+     'Name or service not known'),
+    ('rfc2217', socket.gaierror(socket.EAI_AGAIN, 'Temporary failure in name resolution'), '')])
 def test_host_is_looked_up_and_not_connected_to(
-        monkeypatch: pytest.MonkeyPatch, error: OSError, expected: str) -> None:
+        monkeypatch: pytest.MonkeyPatch, scheme: str, error: OSError, expected: str) -> None:
     asked = []
 
     def look_up(*arguments: object) -> None:
@@ -114,7 +112,7 @@ def test_host_is_looked_up_and_not_connected_to(
 
     monkeypatch.setattr(trial.socket, 'getaddrinfo', look_up)
     monkeypatch.setattr(trial.socket.socket, 'connect', lambda *arguments: pytest.fail('connects'))
-    assert why_not(PortSettings('socket://plc-gate:4001'), 10.0) == expected
+    assert why_not(PortSettings(f'{scheme}://plc-gate:4001'), 10.0) == expected
     assert asked == [('plc-gate', None)]
 
 
@@ -126,14 +124,6 @@ def test_port_that_does_not_say_in_time_is_not_refused(monkeypatch: pytest.Monke
 
 
 Sockets = tuple[DescriptorPort, socket.socket]
-
-
-def test_read_returns_what_is_there(sockets: Sockets, wake: int) -> None:
-    port, other = sockets
-    other.send(b'abc')
-    assert port.read(None, wake) == b'abc'
-    assert port.read(0.0, wake) == b''
-    assert port.read(0.001, wake) == b''
 
 
 def test_read_ends_when_woken(sockets: Sockets, pipe: tuple[int, int]) -> None:

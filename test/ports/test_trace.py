@@ -17,6 +17,7 @@
 from pathlib import Path
 import threading
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 from abdf1_ros.ports import trace as trace_module
 from abdf1_ros.ports.settings import PortSettings
@@ -61,6 +62,9 @@ def test_both_directions_with_their_times(tmp_path: Path) -> None:
     assert port.read(None, 0) == b''
     port.close()
     assert loop.closed
+    port = TracedPort(inner := Mock(), trace, 0.0)
+    assert [port.has_more, port.is_terminal, port.unsent(), port.errors()] == [
+        inner.has_more, inner.is_terminal, inner.unsent(), inner.errors()]
     trace.close()
     assert chunks_of(tmp_path / 'x') == [
         Chunk(0.5, Direction.OUT, b'\x10\x05'), Chunk(1.25, Direction.IN, b'\x10\x05')]
@@ -172,8 +176,9 @@ def test_opener_that_cannot_record_opens_all_the_same(tmp_path: Path) -> None:
     pty = Pty(tmp_path / 'line')
     errors: list[str] = []
     opener = PortOpener(PortSettings(str(pty.name)))
-    opener.trace(str(tmp_path), 1e6, {}, errors.append)
-    assert errors == [f'{tmp_path}: exists and is not a capture; give another name; '
+    (tmp_path / 'x.1').write_text('mine')
+    opener.trace(str(tmp_path / 'x'), 1e6, {}, errors.append)
+    assert errors == [f'{tmp_path}/x.1: exists and is not a capture; give another name; '
                       'nothing is recorded']
     port = opener.open()
     assert not isinstance(port, TracedPort)

@@ -347,9 +347,11 @@ def test_counts_labels_and_words_are_not_left_over_bytes(line: str) -> None:
 
 
 def test_time_of_day_goes_on_after_midnight() -> None:
-    times = ['23:59:59.900', '00:00:00.100', '00:00:01,100', '20:00:00.000', '00:00:00.100']
+    times = ['00:00:00', '23:59:59.900', '00:00:00.100', '00:00:01,100', '20:00:00.000',
+             '00:00:00.100']
     chunks = read(iter(f'{time} TX: 10 05' for time in times))
-    assert [chunk.time for chunk in chunks] == pytest.approx([0.0, 0.2, 1.2, 72000.1, 86400.2])
+    assert [chunk.time for chunk in chunks] == pytest.approx(
+        [0.0, 86399.9, 86400.1, 86401.1, 158400.0, 172800.1])
 
 
 def test_direction_holds_for_lines_without_one_until_the_next() -> None:

@@ -170,7 +170,7 @@ def test_segments_are_put_together_and_those_that_come_again_are_dropped(tmp_pat
     data = encapsulated(cip(STATUS))
     again = encapsulated(cip(STATUS[:2] + b'\1\0' + STATUS[4:]))
     parts = [(b'', -1, 0x02), (data[:10], 0, 0x18), (data[:10], 0, 0x18), (data[5:30], 5, 0x18),
-             (data[30:] + again, 30, 0x18),
+             (data[30:] + again + 30 * b'\2', 30, 0x18),
              (b'lost before this', 9999, 0x18), (data, 20000, 0x18),
              (data[:40], 21000, 0x18), (data[40:], 21040, 0x18),  # what is complete at its end
              (b'', 4999, 0x02), (data, 5000, 0x18)]  # the same ports in a later connection
@@ -218,7 +218,7 @@ def test_two_plcs_whose_addresses_end_alike_are_two_stations(tmp_path: Path) -> 
                (0.1, ethernet(tcp(encapsulated(cip(STATUS)), 1, net=7))),
                (0.1, ethernet(tcp(encapsulated(cip(b'\6\0\1\0\3')), 59, net=7))),  # at once
                (0.2, ethernet(tcp(encapsulated(cip(STATUS_REPLY[:4], True)), 9, False, net=7))),
-               (0.3, ethernet(tcp(encapsulated(cip(STATUS_REPLY, True)), 9, False, net=8)))]
+               (0.3, ethernet(tcp(encapsulated(cip(b'\x46\0\2\0', True)), 66, False, net=7)))]
     entries = entries_of(chunks_of(tmp_path / 'x', pcap(packets)))
     assert [(entry.kind, entry.station) for entry in entries if entry.packet] == [
         (Kind.COMMAND, 30), (Kind.COMMAND, 254), (Kind.COMMAND, 254), (Kind.REPLY, 254),
@@ -229,7 +229,7 @@ def test_two_plcs_whose_addresses_end_alike_are_two_stations(tmp_path: Path) -> 
 def test_packed_files_are_read_and_damage_is_told(tmp_path: Path) -> None:
     packed = gzip.compress(pcap(exchange()))
     assert len(chunks_of(tmp_path / 'x', packed)) == 2
-    for damaged in (packed[:-20], packed[:30] + bytes(40)):
+    for damaged in (packed[:-20], packed[:30] + bytes(40), packed[:10] + 60 * b'\xff'):
         with pytest.raises(Problem, match='damaged gzip file'):
             chunks_of(tmp_path / 'x', damaged)
 
@@ -249,6 +249,8 @@ def test_what_sniff_has_written_is_read_as_it_was(tmp_path: Path) -> None:
         again = [entry for entry in entries_of(read) if entry.wire]
         assert [(entry.kind, entry.wire, entry.text) for entry in again] == [
             (entry.kind, entry.wire, entry.text) for entry in said]
+    assert chunks_of(tmp_path / 'other', pcap([(0.0, b'\1\7\0\0\x10\6')], 147)) == [
+        Chunk(0.0, Direction.UNKNOWN, b'\x10\6')]
 
 
 def test_serial_port_recorded_by_an_rtac_is_read(tmp_path: Path) -> None:
@@ -265,7 +267,7 @@ def test_serial_port_recorded_by_an_rtac_is_read(tmp_path: Path) -> None:
     assert not any(entry.kind is Kind.NOISE for entry in entries)
     simple = chunks_of(tmp_path / 'simple', b''.join((  # whose packets are filled up to words
         pcapng([], '<', b'', 1e6).partition(block('<', 1, struct.pack('<HHI', ETHERNET, 0, 0)))[0],
-        block('<', 1, struct.pack('<HHI', 250, 0, 0)),
+        *(block('<', 1, struct.pack('<HHI', link_type, 0, 0)) for link_type in (250, COOKED)),
         *(block('<', 3, struct.pack('<I', len(data)) + data) for _, data in packets))))
     assert b''.join(chunk.data for chunk in simple) == 3 * b''.join(sent)
 
@@ -288,7 +290,8 @@ def test_damage_is_told_with_its_place(tmp_path: Path, content: bytes, fault: st
 def test_csp_is_named(tmp_path: Path) -> None:
     packet = tcp(bytes(40), 0).replace((44818).to_bytes(2, 'big'), (2222).to_bytes(2, 'big'))
     with pytest.raises(Problem, match='; TCP port 2222 is CSP, which is not decoded'):
-        chunks_of(tmp_path / 'x', pcap([(0.0, ethernet(packet))]))
+        chunks_of(tmp_path / 'x', pcap([(0.0, ethernet(packet)), (0.1, ethernet(packet.replace(
+            (2222).to_bytes(2, 'big'), b'\0\x50')))]))
 
 
 @for_all('packet', [

@@ -86,7 +86,8 @@ def summary() -> Summary:
     summary.take(Chunk(0.0, OUT, bytes(600)))
     summary.take(Chunk(2.0, IN, bytes(360)))
     for entry in (replace(POLL, valid=False), COMMAND, REPLY, REFUSAL, DAMAGED, NOISE,
-                  Entry(2.0, IN, Kind.SILENCE, station=16)):
+                  *(Entry(2.0, IN, kind, station=16, marks=(mark,)) for number, (kind, mark) in
+                    enumerate(zip(Kind, 2 * [*Mark]), 1) for _ in range(number))):
         summary.add(entry)
     return summary
 
@@ -95,24 +96,27 @@ def test_summary_counts_what_was_seen_and_what_was_wrong(summary: Summary) -> No
     head, seen, faults, latency, _, one, sixteen = summary_lines(summary, HALF)
     assert head == ('summary: 2.0 s, 960 bytes (600 >, 360 <), half duplex, CRC, '
                     'line load 50.0% at 9600 baud')
-    assert seen == '  seen: 1 command, 2 replies, 1 of them with an error, 1 poll'
-    assert faults == ('  faults: 2 damaged, 2 bytes of noise, 1 retransmission, '
-                      '1 duplicate, 1 polls and messages without answer')
+    assert seen == ('  seen: 3 commands, 5 replies, 1 of them with an error, 2 polls, 6 EOT, '
+                    '4 ACK, 5 NAK, 7 ENQ, 14 forwarded')
+    assert faults == ('  faults: 10 damaged, 2 bytes of noise, 9 retransmissions, 11 duplicates, '
+                      '12 commands without reply, 11 polls and messages without answer')
     assert latency == '  replies after: mean 500.0 ms, max 750.0 ms'
     assert one.split() == ['1', '0', '0', '1', '2', '1', '1', '2', '0', '500.0', '750.0']
-    assert sixteen.split() == ['16', '1', '1', *'000100', '-', '-']
+    assert sixteen.split() == ['16', '2', '11', '2', '3', '0', '9', '18', '12', '-', '-']
 
 
 def test_json_has_all_that_the_summary_tells(summary: Summary) -> None:
     found = json.loads(summary_json(summary, HALF))
     assert {name: found[name] for name in (
-        'kind', 'seconds', 'bytes', 'check', 'duplex', 'baud', 'load', 'errors', 'damaged')} == {
+        'kind', 'seconds', 'bytes', 'check', 'duplex', 'baud', 'load', 'errors', 'damaged',
+        'noise')} == {
             'kind': 'summary', 'seconds': 2.0, 'bytes': {'>': 600, '<': 360}, 'check': 'CRC',
-            'duplex': 'half', 'baud': 9600, 'load': 0.5, 'errors': 1, 'damaged': 2}
+            'duplex': 'half', 'baud': 9600, 'load': 0.5, 'errors': 1, 'damaged': 10, 'noise': 2}
     assert [(station, counts['latency_ms']) for station, counts in found['stations'].items()] == [
         ('1', {'mean': 500.0, 'max': 750.0}), ('16', None)]
-    assert found['stations']['16']['counts'] == {'poll': 1, 'silence': 1}
-    assert found['marks'] == {'retransmission': 1, 'duplicate': 1}
+    assert [*found['counts'].items()] == [*zip((kind.value for kind in Kind), (
+        2, 3, 5, 4, 5, 6, 7, 9, 9, 11, 11, 12))]
+    assert [*found['marks'].values()] == [9, 11, 12, 14, 16, 18]
     nothing = json.loads(summary_json(Summary(), LineKind(None, None)))
     assert (nothing['check'], nothing['duplex'], nothing['load']) == (None, None, None)
 

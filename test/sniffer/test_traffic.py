@@ -122,8 +122,8 @@ def test_wrong_check_is_marked_and_taken_no_further() -> None:
 def test_repetitions_are_marked() -> None:
     command, reply = (OUT, master(COMMAND)), (IN, message(REPLY))
     ack, answer, poll = (IN, frames.ACK), (OUT, frames.ACK), (OUT, frames.poll_frame(1))
-    entries = decode([command, poll, (IN, frames.EOT), command, ack, command, ack, poll, reply, poll, reply, answer,
-                      poll, reply, answer])
+    entries = decode([command, poll, (IN, frames.EOT), command, ack, command, ack, poll, reply,
+                      poll, reply, answer, poll, reply, answer])
     marks = [entry.marks for entry in entries if entry.packet]
     assert marks == [(), (Mark.RETRANSMISSION,), (Mark.DUPLICATE,), (), (Mark.RETRANSMISSION,),
                      (Mark.DUPLICATE,)]
@@ -132,15 +132,10 @@ def test_repetitions_are_marked() -> None:
 def test_slaves_that_do_not_answer() -> None:
     poll = (OUT, frames.poll_frame(2))
     entries = decode([poll, poll, (OUT, master(COMMAND)), (OUT, master(COMMAND)), poll,
-                      (IN, frames.EOT), poll])
+                      (IN, frames.EOT), (OUT, master(COMMAND._replace(dst=BROADCAST))), poll])
     silent = [(entry.text, entry.station) for entry in entries if entry.kind is Kind.SILENCE]
     assert silent == [('no answer to the poll', 2), ('no answer to the poll', 2),
                       ('no answer to the message', 1), ('no answer to the message', 1)]
-
-
-def test_broadcast_needs_no_answer() -> None:
-    entries = decode([(OUT, master(Packet(255, 5, 0x0F, 0, 1))), (OUT, frames.poll_frame(1))])
-    assert kinds(entries) == [Kind.COMMAND, Kind.POLL]
 
 
 def test_command_without_a_reply_is_told_at_the_end() -> None:
