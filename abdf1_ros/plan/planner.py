@@ -120,8 +120,9 @@ class Planner:
     Plan reads for a line; mappings without a period get ``default_period`` (s).
 
     ``refuse`` and ``allow`` record which words a station lacks or has. No block holds all words of
-    a refused span. ``processors`` holds the processor that each station has named. The planner
-    keeps to the packets of that processor, even if the map allows longer packets.
+    a refused span. ``shorten`` records shorter packets for a span. ``processors`` holds the
+    processor that each station has named. The planner keeps to the packets of that processor, even
+    if the map allows longer packets.
     """
 
     def __init__(self, line: LineModel, default_period: float) -> None:
@@ -129,8 +130,8 @@ class Planner:
         self.processors: dict[int, Processor] = {}
         self._default_period = default_period
         self._refused: defaultdict[StationArea, set[Span]] = defaultdict(set)
-        # Words per packet, for each block that was refused with longer packets.
-        self._limits: dict[tuple[StationArea, Span], int] = {}
+        # Words per packet, for each span that was refused with longer packets.
+        self._limits: defaultdict[StationArea, dict[Span, int]] = defaultdict(dict)
         self._costs: dict[tuple[Dialect, FileType], Sequence[float]] = {}
 
     def plan(self, mappings: Iterable[Mapping]) -> list[Block]:
@@ -173,17 +174,27 @@ class Planner:
         least = block.dialect.sure_read(block.start.file_type)
         if words <= least:
             return []
-        self._limits[block.station_area, block.span] = max(least, words // 2)
-        return [self._block(block.mappings, block.span)]
+        return [self._block(block.mappings, block.span, max(least, words // 2))]
+
+    def shorten(self, block: Block) -> None:
+        """Record that the words of ``block`` are read in packets as short as its own."""
+        self._limits[block.station_area][block.span] = max(
+            request.words for request in block.requests)
 
     def refuse(self, area: StationArea, span: Span) -> None:
         """Record that no read at ``area`` may hold all of ``span``."""
         self._refused[area].add(span)
 
     def allow(self, area: StationArea, span: Span) -> bool:
-        """Record that all of ``span`` can be read; return True if a part of it was refused."""
+        """
+        Record that all of ``span`` can be read; return True if a part of it was refused.
+
+        What was refused is then read in packets of full length again.
+        """
         wrong = {other for other in self._refused[area] if span.holds(other)}
         self._refused[area] -= wrong
+        for other in wrong:
+            self._limits[area].pop(other, None)
         return bool(wrong)
 
     def dialect(self, mapping: Mapping) -> Dialect:
@@ -209,12 +220,12 @@ class Planner:
     def _plan_area(self, area: StationArea, demands: Sequence[_Demand],
                    poll_cycle: float) -> list[Block]:
         """Plan the mappings of one area."""
-        model = self._cost_model(demands[0].mapping, self._refused[area])
+        model = self._cost_model(
+            demands[0].mapping, self._refused[area].union(self._limits[area]))
         alone: defaultdict[Span, list[Mapping]] = defaultdict(list)
         together = []
         for demand in demands:
-            if (demand.span.words > model.limit or (area, demand.span) in self._limits
-                    or demand.span.first < model.first_allowed(demand.span.end)):
+            if demand.span.first < model.first_allowed(demand.span.end):
                 alone[demand.span].append(demand.mapping)
             else:
                 together.append(demand)
@@ -232,10 +243,10 @@ class Planner:
                                          example.address.at_offset(0), self._max_words(example))
         return CostModel(self._costs[key], _per_element(example), refused)
 
-    def _block(self, mappings: Sequence[Mapping], span: Span) -> Block:
+    def _block(self, mappings: Sequence[Mapping], span: Span, limit: int | None = None) -> Block:
         first = mappings[0]
         limit = min(self._max_words(first),
-                    self._limits.get((_station_area(first), span), span.words))
+                    limit or self._limits[_station_area(first)].get(span, span.words))
         if span.words > limit:  # a long mapping: no packet ends within a value
             limit -= limit % _whole(mappings)
         requests = tuple(

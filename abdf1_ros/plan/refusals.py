@@ -18,8 +18,10 @@ Which blocks replace a block that a station refuses.
 A station refuses a whole block for one address that it does not have: of a mapping, or of a gap
 between mappings. The block is divided until each part is good or cannot be divided any more. A
 long mapping may also be refused because the processor takes only shorter packets than we expect:
-then it is tried in shorter ones. The planner keeps the result, and all mappings of the area are
-planned again: the good ones together, and never again with the bad ones.
+then it is tried in shorter ones. But a file may be missing for a moment, and be there again when
+shorter packets are tried. So these count only if two searches in a row find them good. The planner
+keeps the result, and all mappings of the area are planned again: the good ones together, and never
+again with the bad ones.
 """
 
 from __future__ import annotations
@@ -66,9 +68,9 @@ class _RefusalSearch:
         self._open -= 1
         return self._open == 0
 
-    def findings(self) -> list[Span]:
-        """Return the spans that cannot be read, also a gap between two sides that can be read."""
-        found = list(self._refused)
+    def gaps(self) -> list[Span]:
+        """Return what cannot be read between two sides that can be read."""
+        found: list[Span] = []
         smaller = list(self._refused)
         for span, gap in reversed(self._divided):  # parts before the whole
             if not any(span.holds(other) for other in smaller):
@@ -83,6 +85,7 @@ class Refusals:
     def __init__(self, planner: Planner) -> None:
         self._planner = planner
         self._searches: dict[Block, _RefusalSearch] = {}
+        self._shorter: set[Block] = set()  # in shorter packets, and found good by one search
         self.recovering: dict[StationArea, Block] = {}  # last recovered block of each area
 
     def refused(self, block: Block, blocks: Iterable[Block]) -> Change | None:
@@ -94,11 +97,10 @@ class Refusals:
         search = self._searches.pop(block, None)
         halves = self._planner.split(block)
         if not halves:
-            if search:
-                return self._settle(search, block, blocks, is_refused=True)
-            # Later plans then keep it apart from good blocks.
+            # Later plans keep it apart from good blocks, and in these packets, until it is good.
             self._planner.refuse(block.station_area, block.span)
-            return None
+            self._planner.shorten(block)
+            return self._settle(search, block, blocks, is_refused=True) if search else None
         search = search or _RefusalSearch(block)
         search.divide(block, halves)
         for half in halves:
@@ -108,7 +110,14 @@ class Refusals:
     def recovered(self, block: Block, blocks: Iterable[Block]) -> Change | None:
         """Record a good read after a bad one; ``blocks`` are all blocks that are read."""
         search = self._searches.pop(block, None)
+        is_second = block in self._shorter
+        self._shorter = {shorter for shorter in self._shorter
+                         if not block.extent.holds(shorter.extent)}
         if search is not None:
+            if is_second:
+                self._planner.shorten(block)
+            elif len(block.requests) > 1:
+                self._shorter.add(block)
             return self._settle(search, block, blocks, is_refused=False)
         if self._planner.allow(block.station_area, block.span):
             self.recovering[block.station_area] = block
@@ -148,8 +157,8 @@ class Refusals:
                 is_refused: bool) -> Change | None:
         if not search.settle(block, is_refused):
             return None
-        for span in search.findings():
-            self._planner.refuse(block.station_area, span)
+        for gap in search.gaps():
+            self._planner.refuse(block.station_area, gap)
         return self._planned_anew(_of_the_area(block, blocks))
 
 

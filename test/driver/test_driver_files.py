@@ -93,7 +93,7 @@ def test_packets_of_a_5_03_are_too_long_for_an_old_slc_and_become_shorter() -> N
     bench.run(1.0)
     assert bench.listener.values(mapping)[-1] == list(range(100))
     assert bench.listener.reasons == []
-    assert bench.driver.stations[1].remote_errors == 2  # 100 words, then 50
+    assert bench.driver.stations[1].remote_errors == 4  # 100 words, then 50, each twice
 
 
 def test_change_between_reading_and_writing_back_is_lost_as_the_result_says() -> None:

@@ -52,6 +52,7 @@ class Plc:
         self.refused = 0
         self.asked: list[Block] = []
         self.failed: set[str] = set()
+        self._good: set[Block] = set()
         self._mappings = mappings
         self._planner = Planner(LINE, 0.1)
         self._refusals = Refusals(self._planner)
@@ -69,17 +70,20 @@ class Plc:
         if self.refuses(block):
             self.refused += 1
             self.failed |= tags
+            self._good.discard(block)
             change = self._refusals.refused(block, self.blocks)
         else:
-            has_failed = not tags.isdisjoint(self.failed)
+            is_first = block not in self._good
             self.failed -= tags
-            change = (self._refusals.recovered if has_failed else self._refusals.read_again)(
+            self._good.add(block)
+            change = (self._refusals.recovered if is_first else self._refusals.read_again)(
                 block, self.blocks)
         if change is None:
             return False
         assert set(change.old) <= set(self.blocks)
         self.blocks = [other for other in self.blocks if other not in change.old]
         self.blocks += change.new
+        self._good &= {*self.blocks}
         return True
 
     def settle(self) -> None:
@@ -143,9 +147,6 @@ def test_long_mapping_that_is_not_there_is_asked_for_in_the_shortest_packets() -
     assert plc.refused < 6
     block, = plc.blocks
     assert max(request.words for request in block.requests) == 41
-    plc.missing.clear()
-    plc.settle()
-    assert not plc.failed
 
 
 def test_what_recovers_while_a_block_is_divided_leaves_its_parts_alone() -> None:
@@ -161,14 +162,24 @@ def test_what_recovers_while_a_block_is_divided_leaves_its_parts_alone() -> None
     assert plc.spans() == [(0, 12), (12, 13), (13, 20)]
 
 
-def test_row_that_fits_is_not_read_in_the_shorter_packets_of_another() -> None:
-    plc = Plc([make_mapping('N7:0', length=100, plc='SLC'),
-               make_mapping('N7:30', length=20, plc='SLC')])
-    plc.packet = 50
-    for missing in ((), (70,), ()):
-        plc.missing = {*missing}
+@for_all(('places', 'packet', 'blocks'), [
+    ([(0, 80), (0, 40), (40, 40)], 118, 1), ([(0, 60), (59, 59), (59, 1)], 80, 2),
+    ([(0, 100), (30, 20)], 50, 2)])
+@for_all('refused', range(12))
+def test_row_that_fits_is_read_in_one_packet_also_after_its_file_was_missing(
+        places: list[tuple[int, int]], packet: int, blocks: int, refused: int) -> None:
+    plc = Plc(rows := [make_mapping(f'N7:{first}', length=words, plc='SLC')
+                       for first, words in places])
+    plc.packet = packet
+    for _ in range(2):  # after the second time as after the first
+        for number in range(refused):
+            plc.missing = {*range(118)}
+            plc.read(plc.blocks[number % len(plc.blocks)])
+        plc.missing.clear()
         plc.settle()
-    assert plc.spans() == [(0, 100), (30, 50)]
+        assert {mapping: len(block.requests) for block in plc.blocks
+                for mapping in block.mappings} == {row: 1 + (row.length > packet) for row in rows}
+        assert refused or len(plc.blocks) == blocks
 
 
 def test_processor_that_is_exchanged_has_its_own_packets() -> None:
@@ -178,18 +189,6 @@ def test_processor_that_is_exchanged_has_its_own_packets() -> None:
     assert refusals.processor_told(1, Processor.SLC_5_05, blocks) is None
     change = refusals.processor_told(1, Processor.SLC_5_01, blocks)
     assert change and max(block.words for block in change.new) <= 41
-
-
-def test_rows_that_overlap_and_are_too_long_together_are_two_blocks() -> None:
-    plc = Plc([*(make_mapping(f'N7:{word}', plc='SLC', length=length)
-                 for word, length in ((0, 60), (59, 59), (59, 1)))])
-    plc.packet = 80
-    plc.settle()
-    assert plc.spans() == [(0, 60), (59, 118)]
-    plc = Plc(words(*range(110)))
-    plc.packet = 80
-    plc.settle()
-    assert (plc.spans(), plc.refused) == ([(0, 55), (55, 110)], 1)
 
 
 def test_word_that_was_refused_alone_is_not_read_with_others_after_a_search() -> None:
