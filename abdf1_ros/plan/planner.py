@@ -129,6 +129,9 @@ class Planner:
         self.line_model = line
         self.processors: dict[int, Processor] = {}
         self._default_period = default_period
+        # On a full line a block is read once in a poll cycle (s) at most. So short fast blocks save
+        # less there than their periods promise.
+        self._poll_cycle = math.inf
         self._refused: defaultdict[StationArea, set[Span]] = defaultdict(set)
         # Words per packet, for each span that was refused with longer packets.
         self._limits: defaultdict[StationArea, dict[Span, int]] = defaultdict(dict)
@@ -136,17 +139,19 @@ class Planner:
 
     def plan(self, mappings: Iterable[Mapping]) -> list[Block]:
         """Return the blocks that serve every mapping that reads, and read heartbeats back."""
+        mappings = list(mappings)
+        self._poll_cycle = math.inf
+        self._poll_cycle = sum(block.line_time for block in self.plan_again(mappings))
+        return self.plan_again(mappings)
+
+    def plan_again(self, mappings: Iterable[Mapping]) -> list[Block]:
+        """Return the blocks that serve some of the mappings that the last ``plan`` was for."""
         areas: defaultdict[StationArea, list[_Demand]] = defaultdict(list)
         for mapping in mappings:
             if mapping.is_planned:
                 areas[_station_area(mapping)].append(
                     _Demand(mapping, _span(mapping), self._period(mapping)))
-        plans = [self._plan_area(area, group, math.inf) for area, group in areas.items()]
-        # On a full line a block is read once in a poll cycle at most. So short fast blocks save
-        # less there than their periods promise.
-        poll_cycle = sum(block.line_time for plan in plans for block in plan)
-        return [block for area, group in areas.items()
-                for block in self._plan_area(area, group, poll_cycle)]
+        return [block for area, group in areas.items() for block in self._plan_area(area, group)]
 
     def alone(self, mapping: Mapping) -> Block:
         """Return the block of a row that is read by itself, such as a row on demand."""
@@ -217,8 +222,7 @@ class Planner:
         # and finds a foreign value whenever it was written.
         return seconds / 2 if mapping.is_heartbeat else seconds
 
-    def _plan_area(self, area: StationArea, demands: Sequence[_Demand],
-                   poll_cycle: float) -> list[Block]:
+    def _plan_area(self, area: StationArea, demands: Sequence[_Demand]) -> list[Block]:
         """Plan the mappings of one area."""
         model = self._cost_model(
             demands[0].mapping, self._refused[area].union(self._limits[area]))
@@ -232,7 +236,7 @@ class Planner:
         needed: defaultdict[float, list[Span]] = defaultdict(list)
         for demand in together:
             needed[demand.period].append(demand.span)
-        served = alone | _served(together, partition(needed, model, poll_cycle))
+        served = alone | _served(together, partition(needed, model, self._poll_cycle))
         return [self._block(group, span) for span, group in served.items()]
 
     def _cost_model(self, example: Mapping, refused: Iterable[Span]) -> CostModel:

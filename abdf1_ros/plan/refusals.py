@@ -148,7 +148,7 @@ class Refusals:
         """Return the blocks that replace ``blocks``; parts of a running search stay."""
         parts = {part for search in self._searches.values() for part in search.parts}
         old = {block for block in blocks if block not in parts}
-        new = set(self._planner.plan(sorted(
+        new = set(self._planner.plan_again(sorted(
             (mapping for block in old for mapping in block.mappings),
             key=lambda mapping: mapping.item)))
         return Change([*(old - new)], [*(new - old)])

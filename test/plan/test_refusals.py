@@ -184,9 +184,11 @@ def test_row_that_fits_is_read_in_one_packet_also_after_its_file_was_missing(
 
 def test_processor_that_is_exchanged_has_its_own_packets() -> None:
     refusals = Refusals(planner := Planner(LINE, 0.1))
-    blocks = planner.plan([make_mapping(text, plc='SLC') for text in (
-        'ST9:0', *(f'N7:{word}' for word in range(100)))])  # a 5/01 has no string file
-    assert refusals.processor_told(1, Processor.SLC_5_05, blocks) is None
+    blocks = planner.plan([make_mapping('N7:110', plc='SLC', period=10_000), *(
+        make_mapping(text, plc='SLC') for text in (
+            'ST9:0', *(f'N7:{word}' for word in range(100)))),  # a 5/01 has no string file
+        *(make_mapping(f'N{file}:0', station=2, length=100) for file in range(10, 60))])
+    assert refusals.processor_told(1, Processor.SLC_5_05, blocks) is None  # the line is as full
     change = refusals.processor_told(1, Processor.SLC_5_01, blocks)
     assert change and max(block.words for block in change.new) <= 41
 
