@@ -129,9 +129,7 @@ class Planner:
         self.line_model = line
         self.processors: dict[int, Processor] = {}
         self._default_period = default_period
-        # On a full line a block is read once in a poll cycle (s) at most. So short fast blocks save
-        # less there than their periods promise.
-        self._poll_cycle = math.inf
+        self._poll_cycle = 0.0  # seconds on a full line, else 0
         self._refused: defaultdict[StationArea, set[Span]] = defaultdict(set)
         # Words per packet, for each span that was refused with longer packets.
         self._limits: defaultdict[StationArea, dict[Span, int]] = defaultdict(dict)
@@ -139,18 +137,24 @@ class Planner:
 
     def plan(self, mappings: Iterable[Mapping]) -> list[Block]:
         """Return the blocks that serve every mapping that reads, and read heartbeats back."""
-        mappings = list(mappings)
+        planned = [mapping for mapping in mappings if mapping.is_planned]
+        if all(map(self._period, planned)):
+            self._poll_cycle = 0.0
+            blocks = self.plan_again(planned)
+            if sum(block.line_time / block.period for block in blocks) <= 1:
+                return blocks
+        # On a full line a block is read once in a poll cycle at most. So short fast blocks save
+        # less there than their periods promise.
         self._poll_cycle = math.inf
-        self._poll_cycle = sum(block.line_time for block in self.plan_again(mappings))
-        return self.plan_again(mappings)
+        self._poll_cycle = sum(block.line_time for block in self.plan_again(planned))
+        return self.plan_again(planned)
 
     def plan_again(self, mappings: Iterable[Mapping]) -> list[Block]:
         """Return the blocks that serve some of the mappings that the last ``plan`` was for."""
         areas: defaultdict[StationArea, list[_Demand]] = defaultdict(list)
         for mapping in mappings:
-            if mapping.is_planned:
-                areas[_station_area(mapping)].append(
-                    _Demand(mapping, _span(mapping), self._period(mapping)))
+            areas[_station_area(mapping)].append(
+                _Demand(mapping, _span(mapping), self._period(mapping)))
         return [block for area, group in areas.items() for block in self._plan_area(area, group)]
 
     def alone(self, mapping: Mapping) -> Block:
