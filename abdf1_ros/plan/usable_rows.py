@@ -74,7 +74,10 @@ def usable_rows(mappings: Rows, network: Network,
     found = line_problems(mappings, network)
     problems = [problem for _, problem in found]
     left = mappings.without(mapping for mapping, _ in found)
-    faults = [*guard_faults(line_model(network), left, default_period)] or [*broken_links(left)]
+    # In Mode Listen nothing is planned; ``broken_links`` compares While_Timeout with the Period.
+    planned = [] if network.line_mode.only_listens else [
+        *guard_faults(line_model(network), left, default_period)]
+    faults = planned or [*broken_links(left)]
     while faults:
         for mapping, fault in faults:
             problems.append(_problem(mapping, fault.column, fault.text))

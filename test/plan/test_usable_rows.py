@@ -84,14 +84,14 @@ def test_gateway_is_not_our_own_station(network: Network, is_wrong: bool) -> Non
 
 
 def test_rule_14_counter_has_to_be_read_often_enough_on_this_line() -> None:
-    counter = make_mapping('N11:3', tag='alive', item=1)
-    guarded = make_mapping('N7:0', tag='level', item=2, condition=While(('alive',), 250))
-    orphan = make_mapping('N7:1', tag='orphan', item=3, condition=While(('gone',), 900))
-    good, (problem, _) = usable_rows(Rows([counter, guarded, orphan]), Network(baud=19200), 0.1)
+    counter = make_mapping('N11:3', tag='alive', period=100, item=1)
+    guarded = make_mapping('N7:0', tag='it', period=100, item=2, condition=While(('alive',), 300))
+    good, (problem,) = usable_rows(rows := Rows([counter, guarded]), Network(baud=1200), 0.1)
     assert good == (counter,)
     assert str(problem) == (
-        'map.csv:3 (While_Timeout): Item: 2, While_Timeout 250 ms is shorter than 3 reads '
-        'of alive on this line; 300 ms would be enough')
+        'map.csv:3 (While_Timeout): Item: 2, While_Timeout 300 ms is shorter than 3 reads '
+        'of alive on this line; 2620 ms would be enough')
+    assert usable_rows(rows, Network(mode='Listen', baud=1200), 0.1) == (rows, [])
 
 
 def test_rule_15_row_that_does_not_fit_the_line_takes_along_what_depends_on_it() -> None:
