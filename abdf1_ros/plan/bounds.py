@@ -443,9 +443,8 @@ def guard_faults(model: LineModel, mappings: Rows,
     expected = forecast.intervals(blocks, own_work(model, mappings, default_period))
     found = {mapping.tag: expected[block.period] for block in blocks for mapping in block.mappings}
     for mapping, (tag, timeout) in counters.items():
-        needed = READS_IN_TIME * found.get(tag, 0.0)
-        if timeout / 1000 < needed:
+        needed = math.ceil(round(1000 * READS_IN_TIME * found.get(tag, 0.0), 6))
+        if timeout < needed:
             yield mapping, CellFault(
                 'While_Timeout', f'While_Timeout {timeout} ms is shorter than '
-                f'{READS_IN_TIME} reads of {tag} on this line; {needed * 1000:.0f} ms would be '
-                'enough')
+                f'{READS_IN_TIME} reads of {tag} on this line; {needed} ms would be enough')

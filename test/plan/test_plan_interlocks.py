@@ -364,16 +364,16 @@ def test_rule_16_rows_that_are_fast_enough_are_not_warned_of() -> None:
 
 def test_rule_14_timeout_is_three_planned_intervals() -> None:
     counter = make_mapping('N11:3', tag='alive', period=100)
-    guarded = make_mapping('N7:0', tag='level', period=1000, condition=While(('alive',), 250))
-    for busy, enough in ([], 300), ([beat(100)], 571):
-        rows = Rows([counter, guarded, *busy])
+    for busy, enough in ([], 300), ([beat(100)], 572):
+        late, good = (make_mapping('N7:0', tag='level', period=1000, condition=While(
+            ('alive',), timeout)) for timeout in (enough - 1, enough))
+        rows = Rows([counter, late, good, *busy])
         interval = make_report(QUICK, rows, 0.1).intervals()[0.1]
-        assert 3000 * interval == pytest.approx(enough, abs=0.5)
+        assert 3000 * interval == pytest.approx(enough, abs=1.0)
         (mapping, fault), = guard_faults(line_model(QUICK), rows, 0.1)
-        assert mapping is guarded
-        assert (fault.column, fault.text) == (
-            'While_Timeout', 'While_Timeout 250 ms is shorter than 3 reads of alive on this '
-            f'line; {enough} ms would be enough')
+        assert (mapping, fault.column, fault.text) == (
+            late, 'While_Timeout', f'While_Timeout {enough - 1} ms is shorter than 3 reads of '
+            f'alive on this line; {enough} ms would be enough')
 
 
 def test_heartbeats_fallbacks_and_questions_for_run_are_counted_in_the_load() -> None:
