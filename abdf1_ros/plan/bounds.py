@@ -413,13 +413,17 @@ def _question_time(model: LineModel, response_time: float) -> float:
 
 def costs(network: Network, mappings: Rows, default_period: float,
           response_time: float = forecast.USUAL_RESPONSE_TIME) -> Iterator[str]:
-    """Yield what While RUN costs, for each station."""
+    """Yield what While RUN costs or needs, for each station."""
     question = _question_time(forecast.line_model(network), response_time)
     periods = mode_periods(mappings, default_period, forecast.USUAL_STALE_AFTER)
     for station in sorted({mapping.station for mapping in mappings.guarded if mapping.needs_run}):
-        yield (f'While RUN: asking station {station} for its mode about every '
-               f'{milliseconds(periods[station])} takes {question / periods[station]:.0%} of the '
-               'time')
+        if network.line_mode.only_listens:
+            yield (f'While RUN: rows have values only if the master asks station {station} for '
+                   'its diagnostic status')
+        else:
+            yield (f'While RUN: asking station {station} for its mode about every '
+                   f'{milliseconds(periods[station])} takes '
+                   f'{question / periods[station]:.0%} of the time')
 
 
 def conditions(network: Network, mappings: Rows) -> Iterator[str]:

@@ -340,6 +340,7 @@ def test_bits_that_go_on_without_the_program_are_noted_and_are_not_odd() -> None
                     'PLC stops')
     assert cost == ('While RUN: asking station 1 for its mode about every 1000 ms takes '
                     f'{62 * CHARACTER + ANSWERS:.0%} of the time')
+    assert report_of(*rows, mode='Listen').notes()[0].startswith('While RUN: rows have values')
     assert report_of(rows[3]).notes() == []
     assert report_of(make_mapping('B3:0/0', tag='door', publish='Change')).notes()[0] == (
         'bits with Publish Change: door; their topics have no deadline, so a subscriber '
