@@ -457,7 +457,7 @@ def test_poll_cycle_is_unknown_before_the_second_read(bench: Bench) -> None:
     assert values['poll cycle with Periods'] == \
         values['longest poll cycle with Periods'] == 'unknown'
     expected = round(bench.driver.readings.expected_poll_cycle * 1000)
-    assert values['expected poll cycle, line time alone'] == f'{expected} ms'
+    assert values['expected poll cycle, 10 ms an answer'] == f'{expected} ms'
 
 
 def test_link_tells_how_far_behind_each_period_is(bench: Bench) -> None:

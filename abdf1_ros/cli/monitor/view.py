@@ -51,7 +51,7 @@ _STATION = 'station '
 # Words for values of the link in the second line.
 _FACTS = (('load', 'line load'), ('cycle', 'poll cycle with Periods'))
 LINK_KEYS = ('settings', 'transactions per second', 'line load', 'poll cycle with Periods',
-             'longest poll cycle with Periods', 'expected poll cycle, line time alone')
+             'longest poll cycle with Periods', 'expected poll cycle, 10 ms an answer')
 _PERIOD = 'period '  # beginning of keys of the link about a Period
 LOAD_BY_TOPIC = 'line load by topic'
 STATION_KEYS = ('last answer', 'transactions without reply', 'error replies', 'processor',

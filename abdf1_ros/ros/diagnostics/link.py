@@ -111,7 +111,7 @@ class LinkStatus:
             'poll cycle with Periods': milliseconds(driver.readings.reads.poll_cycle),
             'longest poll cycle with Periods': milliseconds(
                 driver.readings.reads.longest_poll_cycle),
-            'expected poll cycle, line time alone': milliseconds(
+            'expected poll cycle, 10 ms an answer': milliseconds(
                 driver.readings.expected_poll_cycle),
             LOAD_BY_TOPIC: load_by_topic(driver.readings.reads.jobs),
             **_paces(driver.points.values()),
