@@ -50,6 +50,7 @@ class _RefusalSearch:
         self._open = 1
         self._divided: list[tuple[Span, Span]] = []  # refused spans, and where each was divided
         self._refused: list[Span] = []
+        self._good: list[Span] = []
 
     def divide(self, block: Block, halves: Sequence[Block]) -> None:
         """Replace a refused block by its halves, or by itself in shorter packets."""
@@ -63,18 +64,21 @@ class _RefusalSearch:
 
     def settle(self, block: Block, is_refused: bool) -> bool:
         """Record the end of one branch; return True if it was the last."""
-        if is_refused:
-            self._refused.append(block.span)
+        (self._refused if is_refused else self._good).append(block.span)
         self._open -= 1
         return self._open == 0
 
     def gaps(self) -> list[Span]:
-        """Return what cannot be read between two sides that can be read."""
+        """
+        Return what cannot be read between two sides that can be read.
+
+        If that is good elsewhere, it is all of both sides: they are too long together.
+        """
         found: list[Span] = []
         smaller = list(self._refused)
         for span, gap in reversed(self._divided):  # parts before the whole
             if not any(span.holds(other) for other in smaller):
-                found.append(gap)
+                found.append(span if any(good.holds(gap) for good in self._good) else gap)
             smaller.append(span)
         return found
 
