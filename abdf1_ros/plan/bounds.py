@@ -29,7 +29,9 @@ import math
 
 from abdf1_ros.df1.frames import Duplex, MAX_LINK_DATA, stuff
 from abdf1_ros.pccc.address import Address
-from abdf1_ros.pccc.dialect import Transfer
+from abdf1_ros.pccc.dialect import Dialect, Transfer
+from abdf1_ros.pccc.families import FAMILIES
+from abdf1_ros.pccc.file_types import FileType
 from abdf1_ros.pccc.steps import write_requests
 from abdf1_ros.pccc.values import ValueType
 from abdf1_ros.plan import forecast
@@ -148,10 +150,14 @@ class Times:
         # The blocks may have been planned for another line: see ``advice``.
         reads = [model.read_time(block.dialect, request, block.station)
                  for block in (*blocks, *on_demand) for request in block.requests]
-        self._written = {mapping: _packets(model, mapping) for mapping in mappings.written}
+        usual = {mapping: _packets(model, mapping, mapping.dialect)
+                 for mapping in mappings.written}
+        # Where the station names a processor with shorter packets, a row has more of them.
+        self._written = {mapping: _packets(model, mapping, _shortest(mapping))
+                         for mapping in usual}
         # The command of a guest that is under way may be the longest that exists.
         guest = model.transaction_time(MAX_LINK_DATA, MAX_LINK_DATA) if network.share else 0.0
-        written = map(max, self._written.values())
+        written = map(max, usual.values())
         self.any_frames = max(*reads, *written, guest, _question_time(model, 0.0))
         served = [2 * mapping.codec.words for mapping in mappings.served]
         self._serves = bool(served)
@@ -339,7 +345,8 @@ def _late_states(network: Network, mappings: Rows, response_time: float) -> Iter
     """Yield a remark on the first row that may lose its newest state if messages are too many."""
     model = forecast.line_model(network)
     rows = [mapping for mapping in mappings.messages if not mapping.serves]
-    a_write_each = sum(_with_answers(_packets(model, mapping), response_time) for mapping in rows)
+    a_write_each = sum(_with_answers(_packets(model, mapping, mapping.dialect), response_time)
+                       for mapping in rows)
     for mapping in rows:
         after = mapping.fallback.after / 1000 if mapping.fallback else math.inf
         patience = min(USUAL_WRITE_TIMEOUT, after)
@@ -357,11 +364,17 @@ def _with_answers(packets: Sequence[float], response_time: float) -> float:
     return sum(packets) + len(packets) * forecast.ANSWERS * response_time
 
 
-def _packets(model: LineModel, mapping: Mapping) -> list[float]:
+def _shortest(mapping: Mapping) -> Dialect:
+    """Return the dialect with the shortest packets that the station of a row may need."""
+    others = () if mapping.processor else FAMILIES[mapping.plc_type].by_processor.values()
+    return min((mapping.dialect, *others), key=lambda dialect: dialect.max_write(FileType.INTEGER))
+
+
+def _packets(model: LineModel, mapping: Mapping, dialect: Dialect) -> list[float]:
     """Return the line time (s) of each transaction of a write of a row: of its Fallback, or 0."""
     zeros = '' if mapping.type is ValueType.STRING else [0] * mapping.length
     values = raw_values(mapping, mapping.fallback.values) if mapping.fallback else zeros
-    dialect, codec = mapping.dialect, mapping.codec
+    codec = mapping.codec
     requests = write_requests(mapping.address, codec, values, dialect)
     rewritten: list[Address] = []
     if mapping.may_rewrite and not isinstance(values, str):
@@ -385,7 +398,8 @@ def own_work(model: LineModel, mappings: Rows, default_period: float,
     periods |= {mapping: max(mapping.fallback.after / 1000, LEAST_REFRESH)
                 for mapping in mappings.fallbacks if mapping.fallback and not mapping.serves}
     return [*((_with_answers([packet], response_time), period)
-              for mapping, period in periods.items() for packet in _packets(model, mapping)),
+              for mapping, period in periods.items()
+              for packet in _packets(model, mapping, mapping.dialect)),
             *((question, period) for period in
               mode_periods(mappings, default_period, stale_after).values())]
 

@@ -119,6 +119,13 @@ def test_rule_16_counts_doubled_bytes_of_a_fallback(
     assert other - plain == pytest.approx(3 * doubled * 10 / 19200)
 
 
+def test_rule_16_row_of_a_processor_that_is_not_named_may_need_the_most_packets() -> None:
+    long, short, unknown = (Times(QUICK, Rows([make_mapping(
+        'N7:0', 'Write', plc='SLC', processor=processor, length=100,
+        fallback=Fallback((0,) * 100, 500))])).worst for processor in ('5/05', '5/02', None))
+    assert long + 2 < short < unknown  # what is under way may be a longer packet
+
+
 def test_rule_16_counts_that_words_of_bits_may_be_read_and_written_back() -> None:
     masked, rewritten = (next(Times(QUICK, Rows([make_mapping(
         'B3:0/0', 'Write', plc='SLC', processor=processor, length=32,
