@@ -29,11 +29,12 @@ from abdf1_ros.ros.topics.messages import latched_qos, MESSAGES
 from abdf1_ros.ros.untyped import MessageInfo, RosMessage
 from abdf1_ros.text import by_number
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from rclpy.duration import Infinite
+from rclpy.duration import Duration, Infinite
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 from rclpy.validate_full_topic_name import validate_full_topic_name
 from std_msgs.msg import String, UInt16MultiArray  # noqa: I101
 
@@ -148,16 +149,27 @@ class NodeWatch(Listening):
         self.is_there = topics is not None
         if topics is None:
             return
-        reads = {topic: types[0] for topic, types in topics
-                 if topic != f'{self.name}/active_stations' and types[0] in _TYPES}
+        nodes = [_path(*node) for node in self.node.get_node_names_and_namespaces()]
+        if nodes.count(self.name) > 1:  # with a spare, ``topics`` may be of the spare
+            others = tuple(f'{name}/' for name in self.bridges() if name != self.name)
+            topics = [(topic, types) for topic, types in self.node.get_topic_names_and_types()
+                      if not topic.startswith(others)]
+        reads = {topic: (types[0], endpoints) for topic, types in topics
+                 if topic != f'{self.name}/active_stations' and types[0] in _TYPES
+                 and (endpoints := self._endpoints(topic))}
         for topic, known in list(self._subscriptions.items()):
-            if reads.get(topic) != known.type_name:  # the node restarted with another map
-                self.node.destroy_subscription(known.handle)
+            if topic not in reads or reads[topic][0] != known.type_name:
+                self.node.destroy_subscription(known.handle)  # the node has another map now
                 del self._subscriptions[topic]
-        for topic, type_name in reads.items():
-            self._listen(topic, type_name)
+        for topic, (type_name, endpoints) in reads.items():
+            self._listen(topic, type_name, endpoints[0].qos_profile.deadline)
 
-    def _listen(self, topic: str, type_name: str) -> None:
+    def _endpoints(self, topic: str) -> list[TopicEndpointInfo]:
+        """Return what the node, or a spare of its name, publishes a topic with."""
+        return [endpoint for endpoint in self.node.get_publishers_info_by_topic(topic)
+                if _path(endpoint.node_name, endpoint.node_namespace) == self.name]
+
+    def _listen(self, topic: str, type_name: str, deadline: Duration) -> None:
         known = self._subscriptions.get(topic)
         if known is None:
             handle = self.subscribe(_TYPES[type_name], topic, self._taker(topic), latched_qos())
@@ -165,15 +177,8 @@ class NodeWatch(Listening):
             known = _Subscription(
                 type_name, handle, Reading(topic.removeprefix(f'{self.name}/read/'), curve=curve))
             self._subscriptions[topic] = known
-        known.reading = replace(known.reading, promised=self._promised(topic))
-
-    def _promised(self, topic: str) -> float | None:
-        deadlines = [endpoint.qos_profile.deadline
-                     for endpoint in self.node.get_publishers_info_by_topic(topic)
-                     if f'{endpoint.node_namespace.rstrip("/")}/{endpoint.node_name}' == self.name]
-        if not deadlines or deadlines[0] == Infinite:
-            return None
-        return float(deadlines[0].nanoseconds) / 1e9
+        promised = None if deadline == Infinite else float(deadline.nanoseconds) / 1e9
+        known.reading = replace(known.reading, promised=promised)
 
     def _taker(self, topic: str) -> Callable[[RosMessage, MessageInfo], None]:
         def take(message: RosMessage, info: MessageInfo) -> None:
@@ -204,6 +209,10 @@ class NodeWatch(Listening):
     def _take_active(self, message: UInt16MultiArray) -> None:
         self._active = [16 * word + bit for word, bits in enumerate(message.data)
                         for bit in range(16) if bits >> bit & 1]
+
+
+def _path(name: str, namespace: str) -> str:
+    return f'{namespace.rstrip("/")}/{name}'
 
 
 def shown_statuses(message: DiagnosticArray, node: str) -> list[ShownStatus]:

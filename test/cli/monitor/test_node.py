@@ -193,6 +193,10 @@ def test_spare_of_the_same_name_does_not_hide_the_owner_of_the_line(
     until(watch, lambda picture: picture.statuses[0].message == 'OK: silent for long')
     bridge.status('cell/line_a: standby', 'OK: waits', DiagnosticStatus.OK)
     until(watch, lambda picture: [status.section for status in picture.statuses] == ['standby'])
+    with Observer() as host:  # its node comes after that of the spare in the graph of ROS
+        (owner := Bridge(host)).read(make_mapping('N7:0', tag='speed'), [7], '/elsewhere/speed')
+        until(watch, lambda picture: '/elsewhere/speed' in heard(picture))
+        owner.node.destroy_node()
 
 
 def test_stations_are_taken_from_the_bits_of_the_active_node_table(
