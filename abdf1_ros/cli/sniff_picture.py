@@ -130,32 +130,37 @@ class Timeline:
         self._episodes: list[_Episode] = []
         self._latest: dict[tuple[object, ...], _Episode] = {}
         self._count = self._drawn = self._characters = 0
-        self._last, self._character = -math.inf, 0.0
+        self._last: float | None = None  # None in a recording without times
+        self._character = 0.0
         self._strip: _Strip | None = None
 
     def take(self, chunk: Chunk, baud: int | None, begun: str) -> None:
-        """Record a chunk's time before its entries; start a new recording if times go back."""
-        time = -math.inf if chunk.time is None else chunk.time
-        if not self._recordings or time < self._last:
+        """
+        Record a chunk's time before its entries.
+
+        A new recording starts if times go back, or if chunks begin or cease to have times.
+        """
+        time, last, self._last = chunk.time, self._last, chunk.time
+        goes_on = time == last if time is None or last is None else time >= last
+        if not self._recordings or not goes_on:
             self._close()
             length = min(16.0, max(0.5, 19200 / baud)) if baud else 1.0
-            self._recordings.append(_Drawing(len(self._recordings) + 1, length))
+            length, unit = (_CHARACTERS, 'bytes') if time is None else (length, 's')
+            self._recordings.append(_Drawing(len(self._recordings) + 1, length, unit))
         recording = self._recordings[-1]
-        if chunk.time is None:
-            recording.length, recording.unit = _CHARACTERS, 'bytes'
         recording.begun = recording.begun or _moment(begun)
         self._character = BITS_PER_CHARACTER / baud if baud else 0.0
-        self._last = time
 
     def add(self, entry: Entry) -> None:
         """Draw an entry."""
         recording = self._recordings[-1]
-        if entry.time is None:
+        if self._last is None:
             place = begin = float(self._characters)
             self._characters += len(entry.wire)
             end = float(self._characters)
         else:
-            place = min(entry.time, self._last)
+            # the entry may be of the recording before this one
+            place = self._last if entry.time is None else min(entry.time, self._last)
             size = len(entry.wire) * self._character
             begin, end = (place, place + size) if entry.direction is Direction.OUT \
                 else (place - size, place)

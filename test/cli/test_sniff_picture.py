@@ -189,6 +189,9 @@ def test_recordings_one_after_the_other_and_without_times(tmp_path: Path, capsys
     assert 'Recording 2' in drawn(tmp_path, capsys, half, second).texts
     assert [each['id'] for _, each in found.found if 'id' in each] == [
         'r1s0', 'r1s50', 'r2s0']  # at a lower speed a strip is longer
+    (dump := tmp_path / 'dump').write_text('10 05 03 FD 10 02', 'ascii')
+    mixed = drawn(tmp_path, capsys, first, str(dump), second, str(dump)).texts
+    assert {'Recording 3', 'Recording 4'} <= {*mixed} and mixed.count('bytes') == 4
     assert found.texts.count('silence: no answer to the poll') == 2
     assert found.bars('ask') == 2
     raw = tmp_path / 'raw'
