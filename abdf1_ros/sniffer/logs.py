@@ -25,6 +25,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+import math
 import re
 
 from abdf1_ros.sniffer.capture import Chunk, Direction
@@ -33,7 +34,7 @@ from abdf1_ros.sniffer.capture import Chunk, Direction
 _DATE = r'(?:\d{4}[-/.]\d\d?[-/.]\d\d?|\d\d?[-/.]\d\d?[-/.]\d{2,4})[ T]+'
 _TIME_OF_DAY = re.compile(
     rf'(?:{_DATE})?(?P<hours>\d\d?):(?P<minutes>\d\d):(?P<seconds>\d\d(?:[.,]\d+)?)(?!:?\d)')
-_SECONDS = re.compile(r'(?<![\d.])\d+\.\d{3,}(?![\d.])')
+_SECONDS = re.compile(r'(?<![\d.])\d{1,18}\.\d{3,}(?![\d.])')
 _DAY = 86400.0
 _TIME = '~'  # stands for the time in the words of a line
 _SET_BACK = 3600.0  # s; a time of day that is earlier by more than this is of the next day
@@ -100,7 +101,7 @@ class LogReader:
                                or _GLUED.match(words, after)):
             raise ValueError
         if time is not None:
-            self._time = self._since_begin(time)
+            self._time = self._since_begin(time, _TIME_OF_DAY.search(head) is not None)
         if ways or not data or has_words:
             self._way = next(iter(ways)) if len(ways) == 1 else Direction.UNKNOWN
         return self._chunk(data) if data else None
@@ -108,12 +109,12 @@ class LogReader:
     def _chunk(self, data: bytes) -> Chunk:
         return Chunk(self._time, self._way, data)
 
-    def _since_begin(self, time: float) -> float:
-        if self._begun is None:
-            self._begun = time
+    def _since_begin(self, time: float, is_of_day: bool) -> float:
+        if self._begun is None or not is_of_day and time < self._begun:
+            self._begun = time  # a clock that has begun again: another recording
         later = time - self._begun
-        while self._time is not None and later < self._time - _SET_BACK:
-            later += _DAY  # a time of day starts again at midnight
+        if self._time is not None and is_of_day:  # a time of day starts again at midnight
+            later += _DAY * max(0, math.ceil((self._time - _SET_BACK - later) / _DAY))
         return later
 
 

@@ -352,6 +352,8 @@ def test_time_of_day_goes_on_after_midnight() -> None:
     chunks = read(iter(f'{time} TX: 10 05' for time in times))
     assert [chunk.time for chunk in chunks] == pytest.approx(
         [0.0, 86399.9, 86400.1, 86401.1, 158400.0, 172800.1])
+    chunks = read(iter(f'{time} TX: 10 05' for time in ('1732700000123456.000', '0.500', '0.750')))
+    assert [chunk.time for chunk in chunks][1:] == [0.0, 0.25]  # the clock began again
 
 
 def test_direction_holds_for_lines_without_one_until_the_next() -> None:
