@@ -19,6 +19,7 @@ from __future__ import annotations
 import atexit
 from collections.abc import Callable, Iterable
 from contextlib import suppress
+from io import FileIO
 import os
 import select
 import signal
@@ -27,11 +28,15 @@ import threading
 import time
 from types import FrameType
 from typing import Self
+from weakref import WeakSet
 
 # After a signal to end: longest wait of the output for its reader (s), and interval of the checks
 # (s).
 _LAST_OUTPUT = 2.0
 _GLANCE = 0.5
+
+# What ``limit_output`` looks at, beside standard output and standard error.
+OUTPUTS: WeakSet[FileIO] = WeakSet()
 
 
 class EndRequest(threading.Event):
@@ -86,8 +91,8 @@ def limit_output(seconds: float = _LAST_OUTPUT) -> None:
     Drop output that still waits for its reader some ``seconds`` after a signal to end.
 
     Without this, Ctrl-S or a pipe without a reader would delay the end for ever. An alarm
-    interrupts the write, which then continues to the null device. A signal handler may call this
-    function.
+    interrupts the write, which then continues to the null device. The same holds for ``OUTPUTS``.
+    A signal handler may call this function.
     """
     signal.signal(signal.SIGALRM, _drop_stuck)
     signal.setitimer(signal.ITIMER_REAL, seconds, _GLANCE)
@@ -103,7 +108,8 @@ def _stop_alarm() -> None:
 
 
 def _drop_stuck(number: int, frame: FrameType | None) -> None:
-    stuck = [descriptor for descriptor in (1, 2) if _is_stuck(descriptor)]
+    others = [file.fileno() for file in OUTPUTS if not file.closed]
+    stuck = [descriptor for descriptor in (1, 2, *others) if _is_stuck(descriptor)]
     for descriptor in stuck:
         drop(descriptor)
     if 1 in stuck and 2 not in stuck:

@@ -69,8 +69,8 @@ def test_version_of_the_package_is_that_of_its_commands(
 
 # What stays until the interpreter takes its modules apart, when it has no signal handler any more.
 SLOW_END = """
-import time
-from abdf1_ros.signals import limit_output
+import os, time
+from abdf1_ros.signals import limit_output, OUTPUTS
 
 class Slow:
     def __del__(self, sleep=time.sleep):
@@ -78,6 +78,9 @@ class Slow:
 
 slow = Slow()
 limit_output(0.2)
+reader, writer = os.pipe()  # nothing reads it
+OUTPUTS.add(pipe := open(writer, 'wb', 0))
+written = [pipe.write(bytes(99999)) for _ in range(2)]
 print('last words')
 """
 

@@ -67,7 +67,7 @@ from abdf1_ros.ports.trace import begun_now, Trace
 from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings import BAUD_RATES, PARITIES
 from abdf1_ros.settings.network import Network, URLS
-from abdf1_ros.signals import limit_output
+from abdf1_ros.signals import limit_output, OUTPUTS
 from abdf1_ros.sniffer.capture import Chunk, LOST
 from abdf1_ros.sniffer.dumps import Recording
 from abdf1_ros.sniffer.entries import Entry
@@ -120,6 +120,8 @@ class Output:
         self._bundle = _bundle(options) if options.report else None
         self._timeline = _timeline(options) if options.html else None
         self._packets = PcapngWriter(options.pcapng) if options.pcapng else None
+        if self._packets:
+            OUTPUTS.add(self._packets.file)
         self.has_failed = False
         self.is_unread = False
         self._colour = sys.stdout.isatty() and 'NO_COLOR' not in os.environ

@@ -70,8 +70,8 @@ class PcapngWriter:
             raise OSError(f'{path} exists and was not made by --pcapng; give another name')
         self.begun = 0.0
         place.touch(0o640)
-        self._file = place.open('wb', buffering=0)
-        self._file.write(_head())
+        self.file = place.open('wb', buffering=0)
+        self.file.write(_head())
 
     def begin(self, begun: str) -> None:
         """Set the date and time (ISO 8601) from which the times of the next entries count."""
@@ -88,12 +88,12 @@ class PcapngWriter:
                       _VERDICTS[entry.valid])) + entry.wire
         microseconds = max(0, round((self.begun + (entry.time or 0.0)) * 1e6))
         flags = struct.pack('<I', _FLAG[entry.direction])
-        self._file.write(_block(_PACKET, struct.pack(
+        self.file.write(_block(_PACKET, struct.pack(
             '<IIIII', 0, microseconds >> 32, microseconds & 0xFFFFFFFF, len(data), len(data))
             + _padded(data) + _option(_FLAGS, flags) + _option(0, b'')))
 
     def close(self) -> None:
-        self._file.close()
+        self.file.close()
 
 
 def _head() -> bytes:
