@@ -470,6 +470,7 @@ def _print_heard(tap: Tap, trace: Trace | None, output: Output, settings: dict[s
         idle()
     if trace:
         trace.close()
+        output.has_failed |= trace.has_failed
     return status
 
 

@@ -46,9 +46,10 @@ class Trace:
     """
     A capture that ends when it cannot be written; then ``on_error`` is called once.
 
-    A thread of its own writes the capture, so the line does not wait for a disk. If the disk is
-    too slow, chunks are lost. The capture and ``on_error`` report this loss. ``limit`` is the most
-    bytes on the disk. Raises OSError if the capture cannot be begun.
+    ``has_failed`` tells this too. A thread of its own writes the capture, so the line does not
+    wait for a disk. If the disk is too slow, chunks are lost. The capture and ``on_error`` report
+    this loss. ``limit`` is the most bytes on the disk. Raises OSError if the capture cannot be
+    begun.
     """
 
     def __init__(self, path: str, settings: dict[str, str], on_error: Callable[[str], None],
@@ -58,6 +59,7 @@ class Trace:
         self._writer = CaptureWriter(Path(path), limit, settings)
         self._waiting: SimpleQueue[Chunk | str | dict[str, str] | None] = SimpleQueue()
         self._lost = self._told = 0
+        self.has_failed = False
         self._thread = threading.Thread(target=self._run, name='trace', daemon=True)
         self._thread.start()
 
@@ -78,6 +80,7 @@ class Trace:
         try:
             self._write_all()
         except OSError as error:
+            self.has_failed = True
             self._on_error(f'{self._path}: {error.strerror}; nothing more is recorded')
             while self._waiting.get() is not None:
                 pass

@@ -423,7 +423,8 @@ def test_what_a_slow_output_has_lost_is_told_and_saved(
     options = '--save', str(tmp_path / 'of_pty'), '--html', str(tmp_path / 'no' / 'page.html')
     assert main(['--port', 'pty', *options]) == 2  # for the page; a pseudo-terminal has no speed
     assert 'baud' not in (tmp_path / 'of_pty').read_text('ascii')
-    assert main(['--port', 'x', '--baud', '19200']) == 0
+    monkeypatch.setattr('abdf1_ros.sniffer.capture.CaptureWriter.write', Mock(side_effect=OSError))
+    assert main(['--port', 'x', '--baud', '19200', '--save', str(tmp_path / 'full')]) == 2
     assert made.call_args.args[1].baud == 19200
     monkeypatch.setattr(sniff, 'PROGRESS_PERIOD', 0.0)
     monkeypatch.setattr(sys.stderr, 'isatty', lambda: True)
