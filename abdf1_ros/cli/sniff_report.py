@@ -21,6 +21,7 @@ With ``is_anonymous`` the bundle has no values and no names: it has no data of m
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import count
@@ -41,8 +42,8 @@ from abdf1_ros.sniffer.summary import Summary
 
 _STATUS_REQUEST = 0x06, b'\x03'  # CMD, and FNC as the first byte of its data
 
-# A bundle must be small enough for mail: of a long recording it has only the first entries as
-# text. The capture has all entries.
+# A bundle must be small enough for mail: of a long recording it has only the last entries as
+# text: the fault is usually there. The capture has all entries.
 MOST_ENTRIES = 100_000
 
 # The mark that identifies a bundle.
@@ -77,13 +78,14 @@ class ReportBundle:
     settings: Sequence[str] = ()
     conformance: Sequence[str] = ()
     is_anonymous: bool = False
-    _entries: list[Entry] = field(default_factory=list)
+    _entries: deque[Entry] = field(default_factory=lambda: deque(maxlen=MOST_ENTRIES))
+    _count: int = 0
     _processors: dict[int, str] = field(default_factory=dict)
 
     def add(self, entry: Entry) -> None:
         """Add an entry."""
-        if len(self._entries) < MOST_ENTRIES:
-            self._entries.append(entry)
+        self._entries.append(entry)
+        self._count += 1
         reply, request = entry.packet, entry.request
         if reply and request and (request.cmd, request.data) == _STATUS_REQUEST:
             self._take_status(reply)
@@ -138,6 +140,9 @@ class ReportBundle:
         lines += [f'  {name:16} {text}' for name, text in _CONTENTS.items()
                   if any(entry.startswith(name) for entry in names)]
         lines.append('')
+        if left_out := self._count - len(self._entries):
+            lines.append('The entries are the last of the recording; '
+                         f'{left_out} before them are only counted in the summary.')
         if self.is_anonymous:
             lines.append('This bundle was made with --anonymous, without the data of messages and '
                          'the bytes of the recording. Tags and topics are numbered. The files '

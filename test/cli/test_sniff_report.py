@@ -201,7 +201,8 @@ def test_processor_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str],
     assert main([str(path), '--summary', '--report', str(report)]) == 0
     files = unpacked(report)
     assert files['processors.txt'] == text
-    assert len(files['entries.txt'].splitlines()) == 1
+    assert files['entries.txt'].strip().startswith('5.000000 <')
+    assert 'last of the recording; 5 before them are only' in files['README.txt']
     capsys.readouterr()
 
 
