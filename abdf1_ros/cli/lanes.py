@@ -198,6 +198,7 @@ def cells(head: Sequence[str], rows: Iterable[Sequence[str]], right: Sequence[in
 
 def write_page(path: str, title: str, parts: Iterable[str]) -> None:
     """Write a page of HTML parts; raises OSError."""
+    Path(path).touch(0o640)  # not for every user: it may hold the values of a plant
     with open(path, 'w', encoding='utf-8') as file:
         file.write('<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
                    f'{_MARK}\n<meta http-equiv="Content-Security-Policy" '

@@ -128,6 +128,7 @@ class ReportBundle:
             known = 'result.json' if self.is_anonymous else name
             text = anonymous_result(_text(name)) if self.is_anonymous else _text(name)
             texts[_free_name('conformance', known, texts)] = text
+        Path(path).touch(0o640)  # not for every user: it holds the values of a plant
         with ZipFile(path, 'w', ZIP_DEFLATED) as bundle:
             bundle.comment = _COMMENT
             bundle.writestr('README.txt', self._readme(texts))

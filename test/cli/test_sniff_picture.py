@@ -58,7 +58,7 @@ def drawn(tmp_path: Path, capsys: Output, *args: str) -> browser.Elements:
     """Return the page of a recording."""
     page = tmp_path / 'line.html'
     said = call(main, capsys, '--summary', '--html', str(page), *args)
-    assert (said.status, said.err) == (0, '')
+    assert (said.status, said.err, page.stat().st_mode & 0o007) == (0, '', 0)
     return browser.Elements(page.read_text(encoding='utf-8'))
 
 

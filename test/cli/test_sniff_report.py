@@ -65,6 +65,7 @@ def bundle_of(tmp_path: Path, capture: str, *options: str) -> dict[str, str]:
     path = str(tmp_path / 'report.zip')
     assert main([capture, '--summary', '--report', path, '--settings', str(tmp_path / 'map.csv'),
                  '--conformance', str(tmp_path / 'slave.json'), *options]) == 0
+    assert not Path(path).stat().st_mode & 0o007
     return unpacked(path)
 
 
