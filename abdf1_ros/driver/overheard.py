@@ -150,6 +150,8 @@ class Overheard:
 
     def why_unread(self, point: ReadPoint) -> str:
         """Return why a row has no value although the line is heard."""
+        if point not in self._unread and (reason := point.withheld or point.error):
+            return reason
         part = self._parts.get(point)
         return 'no other node reads it' if part is None else (
             f'no reply has all of its words; "{part}" has a part of them')

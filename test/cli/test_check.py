@@ -280,9 +280,9 @@ def test_rows_that_a_recording_fills_are_told(tmp_path: Path, capsys: Output) ->
     net, rows = tmp_path / 'net.csv', tmp_path / 'map.csv'
     net.write_text('Mode,Com_Port,Listen_Port\nListen,/dev/ttyS0,/dev/ttyS1\n', encoding='utf-8')
     rows.write_text(
-        'Tag,Command,Address,Station,PLC_Type,Length,Period\n'
+        'Tag,Command,Address,Station,PLC_Type,Length,Period,While\n'
         'read,Read,N7:8,2,PLC5,2,500\nlonger,Read,N7:8,2,PLC5,3,500\n'
-        'unread,Read,N10:0,2,PLC5,1,500\n', encoding='utf-8')
+        'guarded,Read,N7:8,2,PLC5,2,500,Run\nunread,Read,N10:0,2,PLC5,1,500\n', encoding='utf-8')
     half, full = (VECTOR_FOLDER / 'captures' / f'libplctag_client_crc_plc5{duplex}.cap'
                   for duplex in ('_half_duplex', ''))
     said = full.read_text('ascii')
@@ -301,10 +301,11 @@ def test_rows_that_a_recording_fills_are_told(tmp_path: Path, capsys: Output) ->
         said = capsys.readouterr().out
         assert '/dev/ttyS0 and /dev/ttyS1: Mode Listen, ' in said
         assert 'warning: unread is not filled: no other node reads it' in said
+        assert 'warning: guarded is not filled: not in RUN: its mode is not' in said
         assert 'warning: longer is not filled: no reply has all of its words; "word range read' \
             in said
         assert 'warning: read is' not in said
-        assert 'the recording fills 1 of 3 rows; it has:' in said
+        assert 'the recording fills 1 of 4 rows; it has:' in said
         assert re.search('station 2: word range read N7:7, 3 words: (5|10) times', said)
     assert main([str(net), str(rows), '--json', *heard]) == 0
     content = json.loads(capsys.readouterr().out)['heard']
@@ -318,4 +319,4 @@ def test_rows_that_a_recording_fills_are_told(tmp_path: Path, capsys: Output) ->
     net.write_text('Com_Port,Error_Code\n/dev/ttyS0,BCC\n', encoding='utf-8')
     rows.write_text(rows.read_text('utf-8').replace('unread,Read,', 'unread,ReadWrite,'), 'utf-8')
     assert main([str(net), str(rows), *heard]) == 0
-    assert 'the recording fills 0 of 2 rows' in capsys.readouterr().out
+    assert 'the recording fills 0 of 3 rows' in capsys.readouterr().out
