@@ -63,6 +63,7 @@ from abdf1_ros.settings.mapping import Command, Mapping
 from abdf1_ros.settings.network import load_network, Network
 from abdf1_ros.settings.rows import Rows
 from abdf1_ros.settings.scaling import Scaling
+from abdf1_ros.settings.share import share_places
 from abdf1_ros.text import by_number, counted, cut, first, in_ms, printable
 
 _MOST_ROWS = 40  # rows of a table; JSON has all rows
@@ -230,10 +231,13 @@ def _folder(options: argparse.Namespace) -> tuple[str, bool]:
         found = examine(str(net), str(map_file), options.default_period / 1000)
         # If the net file has no port, a parameter gives it.
         if found.network is not None and found.network.names_port:
-            for port in found.network.ports:
-                owner = owners.setdefault(line_of(port), name)
+            uses = [(line_of(port), f'{port} is the port of') for port in found.network.ports]
+            uses += [(place.line, f'{place.text} (Share) is used by')
+                     for place in share_places(found.network.share)]
+            for line, text in uses:
+                owner = owners.setdefault(line, name)
                 if owner != name:
-                    found.problems.append(Problem(str(net), f'{port} is the port of {owner} too'))
+                    found.problems.append(Problem(str(net), f'{text} {owner} too'))
         report = _report(found, options)
         bad += bool(found.problems)
         warned += not found.problems and report is not None and bool(report.remarks())

@@ -231,8 +231,9 @@ def test_lines_stand_in_the_order_of_their_numbers(tmp_path: Path, capsys: Outpu
 
 def test_two_lines_of_a_folder_on_one_port_are_an_error(tmp_path: Path, capsys: Output) -> None:
     for name, port in (('dryer', '1'), ('glue', '/dev/ttyUSB0'), ('oven', '/dev/ttyS0'),
-                       ('paint', 'socket://localhost:4001'), ('press', 'rfc2217://127.1:4001')):
-        write_csv(tmp_path / f'{name}_net.csv', NET_HEADER, [f'{GOOD_NET[:-1]}{port}'])
+                       ('paint', 'socket://localhost:4001,tcp:7'), ('press', 'rfc2217://127.1:4001,tcp:7')):
+        header = NET_HEADER + ',Share' * (',' in port)
+        write_csv(tmp_path / f'{name}_net.csv', header, [f'{GOOD_NET[:-1]}{port}'])
         write_csv(tmp_path / f'{name}_map.csv', MAP_HEADER, [GOOD_ROW.replace('1000', '10')])
     write_csv(tmp_path / 'tap_net.csv', 'Mode,Com_Port,Listen_Port', ['Listen,7,/dev/ttyUSB0'])
     write_csv(tmp_path / 'tap_map.csv', MAP_HEADER, [GOOD_ROW])
@@ -243,9 +244,10 @@ def test_two_lines_of_a_folder_on_one_port_are_an_error(tmp_path: Path, capsys: 
         f'glue: 1 row, port /dev/ttyUSB0, {times}',
         f'oven: error: {tmp_path}/oven_net.csv: /dev/ttyS0 is the port of dryer too',
         f'oven: 1 row, port /dev/ttyS0, {times}',
-        f'paint: 1 row, port socket://localhost:4001, {times}',
+        f'paint: 1 row, port socket://localhost:4001, {times[:-10]}3 warnings',
         f'press: error: {tmp_path}/press_net.csv: rfc2217://127.1:4001 is the port of paint too',
-        f'press: 1 row, port rfc2217://127.1:4001, {times}',
+        f'press: error: {tmp_path}/press_net.csv: tcp:7 (Share) is used by paint too',
+        f'press: 1 row, port rfc2217://127.1:4001, {times[:-10]}3 warnings',
         f'tap: error: {tmp_path}/tap_net.csv: /dev/ttyUSB0 is the port of glue too',
         'tap: 1 row, port /dev/ttyS6, nothing is sent',
         '6 lines: 3 good (3 of them with warnings), 3 with errors']
