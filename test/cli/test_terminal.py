@@ -93,11 +93,15 @@ def test_question_without_a_terminal_is_only_told_and_text_has_its_colour(
     monkeypatch.setattr('sys.stderr', left := Mock(write=Mock(side_effect=BrokenPipeError)))
     tell('tool', 'to a reader that has left')
     assert left.write.called
+    for text, wanted in (('y\n', True), (' YES\n', True), ('yet\n', False), ('', False)):
+        monkeypatch.setattr('sys.stdin', Screen(text))
+        assert is_wanted('set it') is wanted
 
 
 def test_empty_file_may_be_replaced(tmp_path: Path) -> None:
     (tmp_path / 'new').touch()
-    assert may_replace(str(tmp_path / 'new'), lambda place: False)
+    for path in (tmp_path / 'new', tmp_path):  # a folder is refused later
+        assert may_replace(str(path), lambda place: False)
     assert not may_replace(__file__, lambda place: False)
     assert not may_replace(__file__, Mock(side_effect=PermissionError))
 
