@@ -459,8 +459,7 @@ def test_write_through_a_device_server_follows_an_answer(
             retries=0) as here, server.accept()[0] as far:
         with pytest.raises(LinkError) as error:
             here.write('N7:0', 1)
-        sent = far.recv(100)
-        # An echo or a status, and a TNS that begins anywhere.
+        sent = far.recv(100)  # an echo or a status, and a TNS that begins anywhere
         assert (error.value.sent, sent[4], sent[7]) == (False, 0x06, 0x80)
 
 
