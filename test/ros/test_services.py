@@ -384,7 +384,7 @@ def test_services_of_rows_that_are_gone_close_once_when_no_call_waits() -> None:
     assert ended(late) == (False, 'refused: 100 calls wait already')
     for take in node.takes[1:]:
         take(ReadAnswer('Tank\x1b', line_time()))
-    assert {text.partition(' at ')[0] for _, text in map(ended, crowd)} == {r'Tank\x1b'}
+    assert {(is_read, text[:8]) for is_read, text in map(ended, crowd)} == {(True, r'Tank\x1b')}
     puts[3].send(None)
     last = node.made['~/read_now/n1'](Trigger.Request(), Trigger.Response())
     last.send(None)
