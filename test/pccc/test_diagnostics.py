@@ -167,7 +167,7 @@ def test_every_setting_is_read_back(plc_type: PlcType, texts: tuple[str, ...]) -
     (PlcType.PLC2, 'no communication between module and processor')])
 def test_fault_is_read_back(plc_type: PlcType, fault: str) -> None:
     identity = decode_identity(encoded(plc_type, Setting.FAULT))
-    assert (identity.faults, identity.is_running) == ((fault,), False)
+    assert (identity.faults, identity.mode and identity.mode.words) == ((fault,), 'program')
 
 
 LAYOUTS = (COUNTERS, FULL_DUPLEX_COUNTERS, MASTER_COUNTERS, SLAVE_COUNTERS, ML1000_COUNTERS)

@@ -58,7 +58,7 @@ def test_both_forms_name_the_same_place(text: str, levels: str, shown: str, offs
     ('T:4.POS', 'POS is not a member; members of T: CTL, PRE, ACC, EN, TT, DN'),
     ('T:4/2', 'bit 02 of a T element has no name; bits: EN, TT, DN; words: T:0.ACC'),
     ('T:4.3', '3 is not a member'), ('T:4.ACC/DN', 'PLC-3 bits are octal'),
-    ('E3.1.8.10.0', 'or E3.1.8.10.0.5'), ('N7:0/DN', 'PLC-3 bits are octal'))),
+    ('E3.1.8.10.0', 'or E3.1.8.10.0.5'), ('T:4.DN/3', 'DN is a bit already'))),
     *((AddressRangeError, *case) for case in (
         ('E2.1.8.10.0.0', 'only the data table, E3.1, can be read'),
         ('E3.2.8.10.0.0', 'only the data table, E3.1, can be read'),

@@ -19,6 +19,7 @@ import math
 from pathlib import Path
 from unittest.mock import MagicMock, Mock
 
+from abdf1_ros.counters import Counters
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Code, Control, Frame, Poll
@@ -115,6 +116,8 @@ def test_data_file_fills_the_tables_of_its_plcs(path: Path, clock: Clock) -> Non
                     '1,PLC5,F8:1,1,1.5,,', '1,plc5,ST9:0,1,Hi,,', '2,SLC,L10:255,1,70000,,',
                     '2,MicroLogix,I:1.0,2,5,,')
     assert (one.station, two.station) == (1, 2)
+    store(one, 'N7:1', [9])
+    one.download()  # also without a ladder
     assert stored(one, 'N7:0', 3) == b'\1\0\xfe\xff\3\0'
     assert stored(one, 'B3:0') == b'\x50\0'
     assert stored(one, 'F8:0', 4) == bytes(4) + b'\0\0\xc0\x3f'
@@ -395,13 +398,6 @@ def test_download_brings_back_the_words_of_the_start() -> None:
     assert stored(plc, 'S:1')[1] >> 7 == 1  # the first scan
 
 
-def test_download_without_a_ladder_brings_back_the_data_file(path: Path, clock: Clock) -> None:
-    plc, = load(path, clock, '1,SLC,N7:0,2,7 8,,')
-    store(plc, 'N7:0', [5])
-    plc.download()
-    assert stored(plc, 'N7:0', 2) == bytes([7, 0, 8, 0])
-
-
 def test_power_cycle_keeps_words_and_begins_anew() -> None:
     clock, plc = _with_ladder()
     store(plc, 'N10:0', [5, 42])
@@ -494,15 +490,19 @@ def test_command_changes_the_faults_of_its_station_alone(
     assert plcs[0].faults == InjectedFaults()
 
 
-def test_counters_are_told(plcs: list[SimulatedPlc]) -> None:
+def test_counters_are_told_and_served_as_those_of_the_port(plcs: list[SimulatedPlc]) -> None:
     plcs[1].faults = faults = InjectedFaults(slow=9)
-    plcs[1].counters.messages_sent, plcs[1].counters.chars_received = 3, 70
-    name, _, counts = execute('counters 12', plcs).partition(': ')
-    assert name == 'station 12'
-    told = dict(word.split('=') for word in counts.split())
+    plcs[1].counters.messages_sent, plcs[1].counters.enq_retries = 3, 4
+    text = execute('counters 12', plcs).removeprefix('station 12: ')
+    told = dict(word.split('=') for word in text.split())
     assert {key: int(value) for key, value in told.items()} == plcs[1].counters.by_mnemonic()
     assert told['CNT_MSG_PACKETS_SENT'] == '3'
     assert plcs[1].faults is faults
+    plcs[0].be_radio(Counters(messages_sent=7, unsent_messages=9))
+    assert execute('counters 1', plcs).count('=7') == 1
+    plcs[1].be_full_duplex()
+    radio, peer = (plc.serve(Packet(plc.station, 5, 6, 0, 1, b'\1\0\0\xf4')).data for plc in plcs)
+    assert (radio[2:8], peer[8:10]) == (b'\7\0\0\0\x09\0', b'\4\0')
 
 
 @pytest.mark.parametrize('line, text', [
