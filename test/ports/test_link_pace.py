@@ -326,9 +326,12 @@ def test_request_that_comes_together_with_bytes_is_taken_after_them() -> None:
     assert script.heard.get_nowait() is None
 
 
-def test_line_is_not_left_alone_after_a_frame() -> None:
-    script = Script(Listen(None))
-    thread = Restful(script, Babbler(bytes(READ_SIZE - 1), 11, has_more=False))
-    thread.run_out()
-    assert script.machine.counters.chars_received == 10 * (READ_SIZE - 1)
-    assert not thread.rests
+def test_rest_in_a_burst_ends_with_the_deadline(monkeypatch: pytest.MonkeyPatch) -> None:
+    wake = Mock(descriptor=0, take=lambda: False)
+    monkeypatch.setattr('abdf1_ros.ports.link_thread.Wake', lambda: wake)
+    for timeout, rest in ((0.005, 11), (3600.0, 64)):
+        script = Script(Send(b'?', timeout), timing=LineTiming(0.001))
+        port = Babbler(bytes(64), 2)
+        Impatient(script.machine, Mock(return_value=port), 1, clock=port.clock,
+                  processor_clock=count(1.0).__next__).run_out()
+        assert wake.wait.call_args.args == (rest,)
