@@ -38,7 +38,8 @@ REPLY = Entry(
     Packet(5, 1, 0x46, 0, 0x1234, b'\x01'), 0.75)
 REFUSAL = Entry(1.0, IN, Kind.REPLY, 'STS 50: no', 1, Checksum.CRC, True,
                 Packet(5, 1, 0x46, 0x50, 0x1234), 0.25, marks=(Mark.DUPLICATE,))
-DAMAGED = Entry(2.0, IN, Kind.DAMAGED, 'wrong check', 1, Checksum.BCC, False)
+DAMAGED = Entry(2.0, IN, Kind.DAMAGED, 'wrong check', 1, Checksum.BCC, False,
+                Packet(5, 1, 0x46, 0x50, 7))
 POLL = Entry(None, Direction.UNKNOWN, Kind.POLL, '', 16, Checksum.BCC, True)
 NOISE = Entry(3.0, IN, Kind.NOISE, '2 bytes outside of any frame', size=2)
 
