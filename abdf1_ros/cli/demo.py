@@ -21,10 +21,12 @@ Without ROS_DOMAIN_ID the demo uses its own domain.
 
 from __future__ import annotations
 
+import argparse
 from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 import math
 import os
 from pathlib import Path
@@ -39,9 +41,11 @@ from abdf1_ros.cli.simulator import Cast, parse_options
 from abdf1_ros.cli.terminal import (
     called,
     command_parser,
+    drop_output,
     ignore_further,
-    interruptible,
     number_option,
+    prepare_output,
+    run_command,
 )
 from abdf1_ros.driver.write import show
 from abdf1_ros.paths import config_file
@@ -550,16 +554,18 @@ def main(args: Sequence[str] | None = None) -> int:
                         help='how long to run; 0 stays until Ctrl-C (default: %(default)g)')
     parser.add_argument('--peer', action='store_true',
                         help='show a full-duplex line, on which the PLC writes by itself')
+    prepare_output()
     options = parser.parse_args(args)
+    return run_command('demo', partial(_run, options))
+
+
+def _run(options: argparse.Namespace) -> int:
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
     domain, claim = claim_domain()
     os.environ.setdefault('ROS_DOMAIN_ID', str(domain))
     scene = FULL_DUPLEX if options.peer else HALF_DUPLEX
-    try:
-        with claim, tempfile.TemporaryDirectory(prefix='abdf1_') as folder, interruptible():
-            return tell_steps(Demo(scene, Path(folder) / 'line'), options.seconds)
-    except KeyboardInterrupt:  # before the first step, or after the last step
-        return 0
+    with claim, tempfile.TemporaryDirectory(prefix='abdf1_') as folder:
+        return tell_steps(Demo(scene, Path(folder) / 'line'), options.seconds)
 
 
 def tell_steps(demo: Demo, seconds: float) -> int:
@@ -575,6 +581,9 @@ def tell_steps(demo: Demo, seconds: float) -> int:
         status = 1
         verdict = (f'demo: step {demo.step} of {demo.last_step} was not seen as it should be: '
                    f'{reason}')
+    except OSError:
+        drop_output()  # what ends prints as well
+        raise
     finally:
         ignore_further()  # otherwise one of our processes may stay
         demo.close()

@@ -21,6 +21,7 @@ import re
 import signal
 import time
 from typing import Any
+from unittest.mock import Mock
 
 from abdf1_ros.cli import demo
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -147,3 +148,9 @@ def test_the_last_line_says_what_was_not_seen(
     told: Any = Told(end)
     assert demo.tell_steps(told, 0.0) == status
     assert capsys.readouterr().out.splitlines()[-1] == text
+
+
+def test_output_that_is_not_read_any_more_ends_it_quietly(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr('abdf1_ros.cli.terminal.drop', dropped := Mock())
+    monkeypatch.setattr(demo, 'Demo', lambda *_: Told(BrokenPipeError()))
+    assert (demo.main([]), dropped.call_count) == (0, 2)  # also before its processes end
