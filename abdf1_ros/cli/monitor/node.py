@@ -108,6 +108,7 @@ class NodeWatch(Listening):
         self._subscriptions: dict[str, _Subscription] = {}
         self._statuses: list[ShownStatus] = []
         self._told: float | None = None
+        self._stopped = ''
         self._active: list[int] | None = None
         self._results: deque[ShownStatus] = deque(maxlen=_RESULTS_KEPT)
         self._next_discovery = 0.0
@@ -141,7 +142,7 @@ class NodeWatch(Listening):
                     for topic in sorted(self._subscriptions, key=by_number)]
         return NodeView(
             self.name, self.is_there, self._told, tuple(self._statuses), readings,
-            self._active, tuple(self._results), graph_hint())
+            self._active, tuple(self._results), graph_hint(), self._stopped)
 
     def _discover(self) -> None:
         """Subscribe to the read topics that the node publishes now."""
@@ -197,6 +198,7 @@ class NodeWatch(Listening):
 
     def _take_diagnostics(self, message: DiagnosticArray) -> None:
         statuses, now = shown_statuses(message, self.name.lstrip('/')), time.monotonic()
+        self._stopped = '' if statuses else stopped_lines(message).get(self.name, self._stopped)
         is_owner_heard = self._told is not None and not is_spare(self._statuses) \
             and now - self._told <= silence(self._statuses)
         if statuses and not (is_spare(statuses) and is_owner_heard):
@@ -219,6 +221,13 @@ def shown_statuses(message: DiagnosticArray, node: str) -> list[ShownStatus]:
     """Return the statuses of a node for the picture, not of other nodes."""
     return [shown_status(status, node) for status in message.status
             if status.name.startswith(f'{node}: ')]
+
+
+def stopped_lines(message: DiagnosticArray) -> dict[str, str]:
+    """Return the lines that do not run, with the reason, as the process of many lines tells."""
+    return {pair.key: f'does not run: {pair.value}' for status in message.status
+            if status.name.endswith(': lines') for pair in status.values
+            if pair.key.startswith('/')}
 
 
 def is_spare(statuses: Sequence[ShownStatus]) -> bool:

@@ -25,7 +25,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 import time
 
-from abdf1_ros.cli.monitor.node import Listening, shown_statuses
+from abdf1_ros.cli.monitor.node import Listening, shown_statuses, stopped_lines
 from abdf1_ros.cli.monitor.view import LEVELS, ShownStatus, silence, Style, TextLine
 from abdf1_ros.text import by_number, counted, cut, printable
 from diagnostic_msgs.msg import DiagnosticArray
@@ -100,12 +100,9 @@ class PlantWatch(Listening):
         statuses = shown_statuses(message, node)
         sections = {status.section: status for status in statuses}
         now = time.monotonic()
-        if 'lines' in sections:  # the process of many lines knows the lines that do not run
-            for name, reason in sections['lines'].values.items():
-                if name.startswith('/'):
-                    self._lines[name] = LineState(
-                        name, now, [ShownStatus('', Style.BAD, f'does not run: {reason}')])
-        elif 'standby' in sections:
+        for name, reason in stopped_lines(message).items():
+            self._lines[name] = LineState(name, now, [ShownStatus('', Style.BAD, reason)])
+        if 'standby' in sections:
             host = sections['standby'].values.get('host', '')
             self._waiting.setdefault(f'/{node}', {})[host] = now + silence(statuses)
         elif 'link' in sections and 'mappings' in sections:

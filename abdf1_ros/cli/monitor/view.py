@@ -165,6 +165,7 @@ class NodeView:
     - ``told``: clock value (s) of the last diagnostics; None before the first.
     - ``active``: stations of the Active Node Table; None before the first message.
     - ``results``: the newest first.
+    - ``stopped``: why its line does not run, from the process of many lines; empty if not told.
     """
 
     node: str
@@ -176,6 +177,7 @@ class NodeView:
     results: Sequence[ShownStatus]
     hint: str = ''
     """The reason why topics may not be seen; empty for none."""
+    stopped: str = ''
 
 
 def render(snapshot: NodeView, now: float, width: int,
@@ -232,7 +234,9 @@ def _head(snapshot: NodeView, now: float) -> Iterator[TextLine]:
 def _heard(snapshot: NodeView, now: float) -> Iterator[ShownStatus]:
     """Yield faults of the connection to the node."""
     if not snapshot.is_there:
-        yield ShownStatus('', Style.BAD, 'the node is gone; these are its last messages')
+        yield ShownStatus('', Style.BAD, snapshot.stopped or (
+            'the node is not found yet' if snapshot.told is None else
+            'the node is gone; these are its last messages'))
     if snapshot.told is None:
         remapped = '; if /diagnostics is remapped, monitor needs the same -r' \
             if snapshot.is_there else ''

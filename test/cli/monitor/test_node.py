@@ -156,6 +156,8 @@ def test_complete_are_diagnostics_all_topics_and_every_promised_value(
 
 def test_only_the_statuses_of_the_node_count(bridge: Bridge, watch: NodeWatch) -> None:
     until(watch, lambda picture: picture.is_there and bridge.diagnostics.get_subscription_count())
+    bridge.status('cell/lines: lines', 'ERROR', DiagnosticStatus.ERROR, **{NAME: 'no port'})
+    until(watch, lambda picture: picture.stopped == 'does not run: no port')
     link = DiagnosticStatus(
         name='cell/line_a: link', message='WARN: slow', level=DiagnosticStatus.WARN,
         values=[KeyValue(key='settings', value='9600 baud')])

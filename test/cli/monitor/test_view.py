@@ -283,6 +283,8 @@ def test_only_counters_that_have_counted_are_shown() -> None:
 
 @for_all(('changes', 'text', 'style'), [
     ({'is_there': False}, 'the node is gone', Style.BAD),
+    ({'is_there': False, 'told': None}, 'the node is not found yet', Style.BAD),
+    ({'is_there': False, 'stopped': 'does not run: no port'}, 'not run: no port', Style.BAD),
     ({'told': None}, 'no diagnostics yet; if /diagnostics is remapped', Style.WARNING),
     ({'told': NOW - 5}, 'no diagnostics for 5.0 s', Style.BAD),
     ({'readings': []}, 'no read topic found', Style.WARNING),
