@@ -47,10 +47,11 @@ _READ = re.compile(r'(?P<address>[A-Z]{1,3}\d*:\S+), (?P<count>\d+) (?P<unit>wor
 # The same in bytes, if they are whole words.
 _BYTES = re.compile(r'(?P<address>[0-7]+) \(ADDR \d*[02468]\), (?P<count>\d*[02468]) bytes\Z')
 
-HEAD = """\
+HEAD = f"""\
 # What another master reads on this line, one row a read. Each becomes a topic; the bridge sends
-# nothing (Mode Listen). Period is at least twice the mean time between two such reads. A comment
-# below was heard, too, and is not a row of numbers.
+# nothing (Mode Listen). Period is at least twice the mean time between two such reads. A read that
+# came once has {PERIOD_STEPS[-1]}: enter the longest time (ms) between two of them.
+# A comment below was heard, too, and is not a row of numbers.
 Tag,Command,Address,Station,PLC_Type,Length,Period
 """
 
@@ -150,7 +151,9 @@ def _row(read: Carried, tags: set[str]) -> str:
 
 
 def _period(read: Carried) -> int:
-    interval = (read.last - read.first) / (read.count - 1) if read.count > 1 else 5.0
+    if read.count == 1:
+        return PERIOD_STEPS[-1]
+    interval = (read.last - read.first) / (read.count - 1)
     return next((step for step in PERIOD_STEPS if step >= 2000 * interval), PERIOD_STEPS[-1])
 
 

@@ -249,7 +249,7 @@ def test_reads_of_a_full_duplex_line_are_heard_on_two_ports(
 
 
 @for_all(('cmd', 'data', 'times', 'row'), [
-    (0x0F, 'A1 04 07 89 00', 1, 'n7_0_2_of_3,Read,N7:0,3,SLC,2,10000'),
+    (0x0F, 'A1 04 07 89 00', 1, 'n7_0_2_of_3,Read,N7:0,3,SLC,2,50000'),
     (0x0F, 'A2 08 0A 91 00 00', 2, 'l10_0_2_of_3,Read,L10:0,3,SLC,2,5000'),
     (0x2F, '68 00 00 02 00 06 07 00 02 00', 3, 'n7_0_2_of_3,Read,N7:0,3,PLC5,2,5000'),
     (0x01, '20 00 04', 4, '020_2_of_3,Read,020,3,PLC2,2,2000'),
