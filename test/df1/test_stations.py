@@ -168,6 +168,7 @@ def test_own_writes_take_turns_with_all_others() -> None:
     assert (probes.next, probes.next_own) == (8.0, 15.0)  # a read may have its turn
     probes.spent(1.0, 9.0)
     assert (probes.next, probes.next_own) == (16.0, 16.0)
+    assert not probes.claim_message(15.0)
     probes.keep_none_waiting(20.0, Asker.OWN)
     assert (probes.next, probes.next_own) == (20.0, 27.0)
 
