@@ -457,6 +457,7 @@ def _print_heard(tap: Tap, trace: Trace | None, output: Output, settings: dict[s
             break
         if chunk is None:
             break
+        _tell_lost(tap, trace)
         if trace:
             trace.write(chunk)
         was_unread = output.is_unread
@@ -466,8 +467,8 @@ def _print_heard(tap: Tap, trace: Trace | None, output: Output, settings: dict[s
             if not options.tap:
                 break
             _say('this output is no longer read; the bytes are passed on until Ctrl-C')
-        _tell_lost(tap, trace)
         idle()
+    _tell_lost(tap, trace)
     if trace:
         trace.close()
         output.has_failed |= trace.has_failed
@@ -475,7 +476,7 @@ def _print_heard(tap: Tap, trace: Trace | None, output: Output, settings: dict[s
 
 
 def _tell_lost(tap: Tap, trace: Trace | None) -> None:
-    """Report the pieces that were lost since the last call."""
+    """Report the pieces that were lost here."""
     if lost := tap.new_losses():
         text = f'{counted(lost, "piece")} of traffic lost: this output was too slow'
         _say(text)

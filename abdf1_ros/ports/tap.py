@@ -35,7 +35,23 @@ _PTY = 'pty'
 # Most chunks that wait for the output: some minutes of a busy line.
 MOST_WAITING = 10_000
 
-_TapQueue = SimpleQueue[Chunk | OSError | None]
+
+class _Heard:
+    """What the readers have heard and the output has not taken yet."""
+
+    def __init__(self) -> None:
+        self.waiting: SimpleQueue[tuple[int, Chunk] | OSError | None] = SimpleQueue()
+        self.lost = 0  # chunks, after the last that waits
+        self._lock = threading.Lock()
+
+    def put(self, chunk: Chunk) -> None:
+        """Keep a chunk, with the number of chunks lost before it; lose it if many wait."""
+        with self._lock:
+            if self.waiting.qsize() < MOST_WAITING:
+                self.waiting.put((self.lost, chunk))
+                self.lost = 0
+            else:
+                self.lost += 1
 
 
 def is_pty(name: str) -> bool:
@@ -46,11 +62,10 @@ def is_pty(name: str) -> bool:
 class _TapReader(threading.Thread):
     """Read a port, queue its bytes with their time, and pass them on at once."""
 
-    def __init__(self, port: Port, direction: Direction, onward: Port | None, heard: _TapQueue,
+    def __init__(self, port: Port, direction: Direction, onward: Port | None, heard: _Heard,
                  wake: int) -> None:
         super().__init__(name=f'tap {direction.value}')
         self.stopping = False
-        self.lost = 0  # chunks
         self._port = port
         self._direction = direction
         self._onward = onward
@@ -64,15 +79,12 @@ class _TapReader(threading.Thread):
                 data = self._port.read(None, self._wake)
                 if data:
                     # Queued before it is passed on. Otherwise an answer could be queued before it.
-                    if self._heard.qsize() < MOST_WAITING:
-                        self._heard.put(Chunk(time.monotonic(), self._direction, data))
-                    else:
-                        self.lost += 1
+                    self._heard.put(Chunk(time.monotonic(), self._direction, data))
                     if self._onward is not None:
                         self._onward.write(data)
         except OSError as error:
             # Not as BrokenPipeError, which would look like the broken pipe of standard output.
-            self._heard.put(OSError(error.strerror or str(error)))
+            self._heard.waiting.put(OSError(error.strerror or str(error)))
 
 
 class Tap:
@@ -87,7 +99,7 @@ class Tap:
     def __init__(self, names: Sequence[str], settings: PortSettings) -> None:
         self.names: list[str] = []
         self._settings = settings
-        self._heard: _TapQueue = SimpleQueue()
+        self._heard = _Heard()
         with ExitStack() as stack:
             ports = [self._open(name, stack) for name in names]
             self._open_ports = stack.pop_all()
@@ -116,13 +128,17 @@ class Tap:
         self._open_ports.close()
 
     def new_losses(self) -> int:
-        """Return how many chunks were lost since the last call; ``chunks`` was used too slowly."""
-        before, self._lost = self._lost, sum(reader.lost for reader in self._readers)
-        return self._lost - before
+        """
+        Return how many chunks were lost just before the last chunk, or at the end of ``chunks``.
+
+        ``chunks`` was used too slowly then. A second call returns 0.
+        """
+        lost, self._lost = self._lost, 0
+        return lost
 
     def stop(self) -> None:
         """End ``chunks``; may be called by a signal handler."""
-        self._heard.put(None)
+        self._heard.waiting.put(None)
 
     def chunks(self, seconds: float, period: float, idle: Callable[[], None]) -> Iterator[Chunk]:
         """
@@ -132,18 +148,22 @@ class Tap:
         which nothing is heard. Raises OSError if a port is lost.
         """
         end = self._begun + seconds
-        while (left := end - time.monotonic()) > 0:
-            try:
-                item = self._heard.get(timeout=min(left, period))
-            except Empty:
-                idle()
-                continue
-            if item is None:
-                return
-            if isinstance(item, OSError):
-                raise item
-            # In microseconds, as in a capture, so that live and saved traffic look the same.
-            yield item._replace(time=round((item.time or 0.0) - self._begun, 6))
+        try:
+            while (left := end - time.monotonic()) > 0:
+                try:
+                    item = self._heard.waiting.get(timeout=min(left, period))
+                except Empty:
+                    idle()
+                    continue
+                if item is None:
+                    return
+                if isinstance(item, OSError):
+                    raise item
+                self._lost, chunk = item
+                # In microseconds, as in a capture, so that live and saved traffic look the same.
+                yield chunk._replace(time=round((chunk.time or 0.0) - self._begun, 6))
+        finally:
+            self._lost, self._heard.lost = self._heard.lost, 0
 
     def _open(self, name: str, stack: ExitStack) -> Port:
         line = self._line(name)

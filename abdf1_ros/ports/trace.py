@@ -57,8 +57,9 @@ class Trace:
         self._path = path
         self._on_error = on_error
         self._writer = CaptureWriter(Path(path), limit, settings)
-        self._waiting: SimpleQueue[Chunk | str | dict[str, str] | None] = SimpleQueue()
-        self._lost = self._told = 0
+        # a number says how many chunks were lost at this place
+        self._waiting: SimpleQueue[Chunk | str | dict[str, str] | int | None] = SimpleQueue()
+        self._lost = 0
         self.has_failed = False
         self._thread = threading.Thread(target=self._run, name='trace', daemon=True)
         self._thread.start()
@@ -66,12 +67,19 @@ class Trace:
     def write(self, chunk: Chunk | str | dict[str, str]) -> None:
         """Queue a chunk or settings for the disk, from any thread; no effect after an error."""
         if self._waiting.qsize() < MOST_WAITING:
+            self._put_lost()
             self._waiting.put(chunk)
         else:
             self._lost += 1
 
+    def _put_lost(self) -> None:
+        lost, self._lost = self._lost, 0
+        if lost:
+            self._waiting.put(lost)
+
     def close(self) -> None:
         """End the capture; wait at most 1 s for the disk."""
+        self._put_lost()
         self._waiting.put(None)
         self._thread.join(LAST_CHUNKS)
 
@@ -88,16 +96,13 @@ class Trace:
 
     def _write_all(self) -> None:
         while (chunk := self._waiting.get()) is not None:
-            self._writer.write(chunk)
+            if isinstance(chunk, int):
+                self._writer.write(f'# {LOST}: {chunk}; the disk was too slow')
+                self._on_error(f'{self._path}: the disk was too slow; lines lost: {chunk}')
+            else:
+                self._writer.write(chunk)
             if self._waiting.empty():
-                self._tell_lost()
-        self._tell_lost()
-
-    def _tell_lost(self) -> None:
-        if lost := self._lost - self._told:
-            self._told += lost
-            self._writer.write(f'# {LOST}: {lost}; the disk was too slow')
-            self._on_error(f'{self._path}: the disk was too slow; lines lost: {lost}')
+                self._put_lost()
 
 
 class TracedPort(PortAround):

@@ -405,18 +405,16 @@ def test_lost_port_ends_with_the_summary(tmp_path: Path) -> None:
 
 def test_what_a_slow_output_has_lost_is_told_and_saved(
         tmp_path: Path, capsys: Output, monkeypatch: pytest.MonkeyPatch) -> None:
-    tap = MagicMock(names=['x'], new_losses=Mock(side_effect=[1, 0, 3]), chunks=lambda *args: iter(
-        Chunk(time, Direction.UNKNOWN, frames.poll_frame(2)) for time in (0.0, 0.1, 0.2)))
+    tap = MagicMock(names=['x'], new_losses=Mock(side_effect=[1, 3, 0]), chunks=lambda *args: iter(
+        Chunk(time, Direction.UNKNOWN, frames.poll_frame(2)) for time in (0.0, 0.1)))
     monkeypatch.setattr(sniff, 'Tap', made := Mock(return_value=tap))
     assert main(['--tap', 'x', 'pty', '--parity', 'Even', '--save', str(tmp_path / 'saved')]) == 0
     first, told = (f'{lost} of traffic lost: this output was too slow\n'
                    for lost in ('1 piece', '3 pieces'))
     assert capsys.readouterr().err.endswith(f'sniff: {first}sniff: {told}')
-    assert (tmp_path / 'saved').read_text('ascii').endswith(told)
+    assert f'{told}0.100000 ? ' in (tmp_path / 'saved').read_text('ascii')
     assert main([str(tmp_path / 'saved')]) == 0
-    assert capsys.readouterr().err == (
-        f'sniff: {tmp_path}/saved: the recorder has lost lines before 0.1 s: {first[:-1]}. Faults '
-        'of the line there may be no faults\n')
+    assert f'lost lines before 0.1 s: {told[:-1]}. Faults' in capsys.readouterr().err
     assert made.call_args.args[1].parity == 'Even'
     assert '# baud: 9600\n' in (tmp_path / 'saved').read_text('ascii')
     tap.new_losses = Mock(return_value=0)

@@ -119,15 +119,16 @@ def test_line_does_not_wait_for_a_disk_that_stands_still(
         is_told.set()
 
     monkeypatch.setattr(CaptureWriter, 'write', slow)
-    monkeypatch.setattr(trace_module, 'MOST_WAITING', 3)
     trace = Trace(str(tmp_path / 'x'), {}, tell)
     port = TracedPort(Loop(), trace, 0.0, lambda: 0.0)
     port.write(b'\x01')
     assert is_stuck.wait(PATIENCE)
     all_lost = [2] if has_ended else [1, 2]
     for lost in all_lost:
-        for _ in range(3 + lost):  # none of them waits
-            port.write(b'\x02')
+        for most, written in (3, (3 + lost) * b'\x02'), (9, (lost - 1) * b'\x03'):  # none waits
+            monkeypatch.setattr(trace_module, 'MOST_WAITING', most)
+            for byte in written:
+                port.write(bytes([byte]))
         if has_ended:
             monkeypatch.setattr(trace_module, 'LAST_CHUNKS', 0.0)
             trace.close()
@@ -141,9 +142,9 @@ def test_line_does_not_wait_for_a_disk_that_stands_still(
             assert is_stuck.wait(PATIENCE)
     trace.close()
     assert [chunk.data for chunk in chunks_of(tmp_path / 'x')] == \
-        len(all_lost) * [b'\x01', *[b'\x02'] * 3]
+        [*len(all_lost) * [b'\x01', *[b'\x02'] * 3], b'\x03']
     assert (tmp_path / 'x').read_text().endswith(
-        f'# lines lost here: {lost}; the disk was too slow\n')
+        f'# lines lost here: {lost}; the disk was too slow\n0.000000 > 03\n')
     assert errors == [f'{tmp_path}/x: the disk was too slow; lines lost: {lost}'
                       for lost in all_lost]
 
