@@ -268,14 +268,15 @@ def _pccc(message: bytes) -> Iterator[tuple[bool, bytes]]:
 
 def _executed(cip: bytes) -> bytes:
     """Return the PCCC of a CIP request or response; empty if it has none."""
+    while len(cip) >= 4 and cip[0] == _UNCONNECTED_SEND:
+        body = cip[2 + 2 * cip[1]:]
+        cip = body[4:4 + int.from_bytes(body[2:4], 'little')]
     if len(cip) < 4:
         return b''
     if cip[0] == _EXECUTE_PCCC | _REPLY:
         body = cip[4 + 2 * cip[3]:]
     else:
         body = cip[2 + 2 * cip[1]:]
-        if cip[0] == _UNCONNECTED_SEND and len(body) >= 4:
-            return _executed(body[4:4 + int.from_bytes(body[2:4], 'little')])
         if cip[0] != _EXECUTE_PCCC or not cip[2:].startswith(_PCCC_OBJECT):
             return b''
     return body[body[0]:] if body else b''  # after the requestor, which begins with its length

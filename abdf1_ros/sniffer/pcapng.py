@@ -86,7 +86,8 @@ class PcapngWriter:
             return
         data = bytes((VERSION, DIRECTIONS[entry.direction], _CHECKS[entry.checksum],
                       _VERDICTS[entry.valid])) + entry.wire
-        microseconds = max(0, round((self.begun + (entry.time or 0.0)) * 1e6))
+        microseconds = round((self.begun + (entry.time or 0.0)) * 1e6)
+        microseconds = min(max(0, microseconds), 0xFFFFFFFFFFFFFFFF)
         flags = struct.pack('<I', _FLAG[entry.direction])
         self.file.write(_block(_PACKET, struct.pack(
             '<IIIII', 0, microseconds >> 32, microseconds & 0xFFFFFFFF, len(data), len(data))

@@ -47,10 +47,12 @@ def cip(pccc: bytes, is_reply: bool = False) -> bytes:
     return head + bytes.fromhex('07 4D 00 78 56 34 12') + pccc
 
 
-def sent_through(message: bytes) -> bytes:
-    """Return an Unconnected Send of a message to slot 0."""
-    return (bytes.fromhex('52 02 20 06 24 01 05 F9') + struct.pack('<H', len(message)) + message
-            + bytes.fromhex('01 00 01 00'))
+def sent_through(message: bytes, times: int = 1) -> bytes:
+    """Return an Unconnected Send of a message to slot 0, packed again and again."""
+    for _ in range(times):
+        message = (bytes.fromhex('52 02 20 06 24 01 05 F9') + struct.pack('<H', len(message))
+                   + message + bytes.fromhex('01 00 01 00'))
+    return message
 
 
 def encapsulated(data: bytes, is_connected: bool = False) -> bytes:
@@ -152,7 +154,8 @@ def test_packets_that_the_recorder_has_cut_are_told_and_others_read(tmp_path: Pa
 
 
 @pytest.mark.parametrize('data', [
-    encapsulated(cip(STATUS), is_connected=True), encapsulated(sent_through(cip(STATUS)))])
+    encapsulated(cip(STATUS), is_connected=True), encapsulated(sent_through(cip(STATUS))),
+    encapsulated(sent_through(cip(STATUS), 2000))])
 def test_pccc_comes_connected_and_through_a_backplane(tmp_path: Path, data: bytes) -> None:
     chunk, = chunks_of(tmp_path / 'x', pcap([(0.0, ethernet(tcp(data, 1), vlan=True))]))
     assert chunk == Chunk(0.0, Direction.OUT, bytes((30, 65)) + STATUS, is_message=True)
@@ -353,9 +356,9 @@ def test_what_nobody_said_is_no_packet(tmp_path: Path) -> None:
 
 
 def test_time_of_day_that_is_none_counts_from_0(tmp_path: Path) -> None:
-    for when in (None, -0.5):
-        ack = Entry(when, Direction.OUT, Kind.ACK, wire=b'\x10\x06')
-        assert written(tmp_path / 'x', ack, begun='yesterday')[len(HEAD):][12:20] == bytes(8)
+    for time, told in (None, bytes(8)), (-0.5, bytes(8)), (1e30, b'\xFF' * 8):  # later than a file can tell
+        ack = Entry(time, Direction.OUT, Kind.ACK, wire=b'\x10\x06')
+        assert written(tmp_path / 'x', ack, begun='yesterday')[len(HEAD):][12:20] == told
 
 
 def test_only_a_file_of_ours_is_replaced_and_nobody_else_may_read_it(tmp_path: Path) -> None:
