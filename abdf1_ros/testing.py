@@ -279,7 +279,8 @@ class SimulatedCell:
         net_file, map_file = str(folder / 'net.csv'), str(folder / 'map.csv')
         found = examine(net_file, map_file)
         line = found.network
-        if line and not (line.line_mode.is_master and line.checksum is Checksum.CRC):
+        if line and not line.line_mode.only_listens and not (
+                line.line_mode.is_master and line.checksum is Checksum.CRC):
             found.problems.append(Problem(
                 net_file, 'the simulated PLCs answer only Mode Master with Error_Code CRC'))
         if found.problems:

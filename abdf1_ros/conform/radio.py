@@ -62,6 +62,7 @@ def reply_alone(end: RadioEnd) -> None:
 @case('DLE ACK, NAK, ENQ and EOT are noise here: they get no answer.', _RULES, _NODE)
 def symbols_ignored(end: RadioEnd) -> None:
     end.ask(0x06, b'\x00')
+    end.wire.expect_silence('one reply, which may be sent on')
     for symbol in (codec.NAK, codec.ENQ, codec.ACK, codec.EOT):
         end.wire.forget_reply()
         end.wire.send(symbol)

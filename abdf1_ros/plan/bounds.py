@@ -366,8 +366,10 @@ def _with_answers(packets: Sequence[float], response_time: float) -> float:
 
 def _shortest(mapping: Mapping) -> Dialect:
     """Return the dialect with the shortest packets that the station of a row may need."""
-    others = () if mapping.processor else FAMILIES[mapping.plc_type].by_processor.values()
-    return min((mapping.dialect, *others), key=lambda dialect: dialect.max_write(FileType.INTEGER))
+    found = [mapping.dialect]
+    if mapping.processor is None:
+        found += FAMILIES[mapping.plc_type].by_processor.values()
+    return min(found, key=lambda dialect: dialect.max_write(FileType.INTEGER))
 
 
 def _packets(model: LineModel, mapping: Mapping, dialect: Dialect) -> list[float]:

@@ -405,8 +405,9 @@ def test_lost_port_ends_with_the_summary(tmp_path: Path) -> None:
 
 def test_what_a_slow_output_has_lost_is_told_and_saved(
         tmp_path: Path, capsys: Output, monkeypatch: pytest.MonkeyPatch) -> None:
-    tap = MagicMock(names=['x'], new_losses=Mock(side_effect=[1, 3, 0, 0]), chunks=lambda *args: iter(
-        Chunk(time, Direction.UNKNOWN, frames.poll_frame(2)) for time in (0.0, 0.1, 0.2)))
+    tap = MagicMock(names=['x'], new_losses=Mock(side_effect=[1, 3, 0, 0]))
+    tap.chunks = lambda *args: iter(
+        Chunk(time, Direction.UNKNOWN, frames.poll_frame(2)) for time in (0.0, 0.1, 0.2))
     monkeypatch.setattr(sniff, 'Tap', made := Mock(return_value=tap))
     assert main(['--tap', 'x', 'pty', '--parity', 'Even', '--save', str(tmp_path / 'saved')]) == 0
     first, told = (f'{lost} of traffic lost: this output was too slow\n'

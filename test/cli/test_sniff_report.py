@@ -202,8 +202,8 @@ def test_processor_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str],
     assert main([str(path), '--summary', '--report', str(report)]) == 0
     files = unpacked(report)
     assert files['processors.txt'] == text
-    assert files['entries.txt'].strip().startswith('5.000000 <')
-    assert 'last of the recording; 5 before them are only' in files['README.txt']
+    assert files['entries.txt'].strip().startswith('11.000000 <')
+    assert 'last of the recording; 11 before them are only' in files['README.txt']
     capsys.readouterr()
 
 

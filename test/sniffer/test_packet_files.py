@@ -356,7 +356,7 @@ def test_what_nobody_said_is_no_packet(tmp_path: Path) -> None:
 
 
 def test_time_of_day_that_is_none_counts_from_0(tmp_path: Path) -> None:
-    for time, told in (None, bytes(8)), (-0.5, bytes(8)), (1e30, b'\xFF' * 8):  # later than a file can tell
+    for time, told in (None, bytes(8)), (-0.5, bytes(8)), (1e30, b'\xFF' * 8):
         ack = Entry(time, Direction.OUT, Kind.ACK, wire=b'\x10\x06')
         assert written(tmp_path / 'x', ack, begun='yesterday')[len(HEAD):][12:20] == told
 
