@@ -231,7 +231,8 @@ def test_lines_stand_in_the_order_of_their_numbers(tmp_path: Path, capsys: Outpu
 
 def test_two_lines_of_a_folder_on_one_port_are_an_error(tmp_path: Path, capsys: Output) -> None:
     for name, port in (('dryer', '1'), ('glue', '/dev/ttyUSB0'), ('oven', '/dev/ttyS0'),
-                       ('paint', 'socket://localhost:4001,tcp:7'), ('press', 'rfc2217://127.1:4001,tcp:7')):
+                       ('paint', 'socket://localhost:4001,tcp:7'),
+                       ('press', 'rfc2217://127.1:4001,tcp:7')):
         header = NET_HEADER + ',Share' * (',' in port)
         write_csv(tmp_path / f'{name}_net.csv', header, [f'{GOOD_NET[:-1]}{port}'])
         write_csv(tmp_path / f'{name}_map.csv', MAP_HEADER, [GOOD_ROW.replace('1000', '10')])
