@@ -144,7 +144,7 @@ def test_temporary_folder_is_asked_for_only_where_a_name_is_left_out(
 
     monkeypatch.setattr(files, 'TemporaryDirectory', refuse)
     good = ['--params-file', yaml_file(
-        tmp_path, 'a: {ros__parameters: [!!str x, !!bool on, !!int 1, !!float 2, !!null ~]}')]
+        tmp_path, 'a: {ros__parameters: [!!str x, [!!bool on], !!int 1, !!float 2, !!null ~]}')]
     with usable_files(good, leaves_out=True) as given:
         assert given == good
     bad = yaml_file(tmp_path, 'a-b: {ros__parameters: {port: x}}')

@@ -391,7 +391,7 @@ def test_number_that_yaml_takes_for_octal_is_told(
     path = tmp_path / 'shared.yaml'
     path.write_text(f'{section}:\n  ros__parameters:\n    net:\n      station: 010\n'
                     '      baud: 9600\n      timeout: "0500"\n      nak_retries: 03\n'
-                    '    poll_list: [1, 011]\n    map: {door: {max: 7}}\n'
+                    '    poll_list: [1, 011]\n    map: {door: {max: 010}}\n'
                     '/other:\n  ros__parameters:\n    write_timeout: 010\n',
                     encoding='utf-8')
     assert problems_of(make_node(files), Arguments([str(path)])) == [
@@ -477,7 +477,7 @@ def test_sections_of_other_lines_of_the_process_are_theirs(
 
 
 def test_parameters_of_the_command_line_of_many_lines(make_node: Nodes, files: Files) -> None:
-    args = ['--ros-args', '-p', 'press:read_only:=true', '-p', 'gain:=3',
+    args = ['--ros-args', '-p', 'press:read_only:=true', '-p', 'gain:=3', '-p', 'press:gain:=4',
             '-p', 'abdf1:read_only:=true', '-p', 'parameters:loss:=3']
     node = make_node(files, cli_args=args)
     assert problems_of(node, Arguments.of(args, ['/press'])) == [
@@ -510,7 +510,6 @@ def test_unknown_arguments_are_told_with_what_would_be_right(command: list[str])
     assert unknown_arguments(FILE, iter(['port', 'map_file']), given) == [
         'mapfile: there is no such argument; did you mean map_file?',
         'a: there is no such argument; --show-args lists them']
-    # a file that includes this one has arguments of its own
     assert not unknown_arguments(FILE, [], ['ros2', 'launch', 'cell', 'cell.launch.py', 'x:=1'])
 
 
