@@ -81,8 +81,7 @@ def test_demo_stays_on_this_machine(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv('ROS_AUTOMATIC_DISCOVERY_RANGE')
     ours = os.environ['ROS_DOMAIN_ID']
     monkeypatch.delenv('ROS_DOMAIN_ID')
-    monkeypatch.setattr(demo, 'Demo', lambda *_: None)
-    monkeypatch.setattr(demo, 'tell_steps', lambda *_: 0)
+    monkeypatch.setattr(demo, 'Demo', lambda *_: Told(None))
     assert demo.main([]) == 0
     assert os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'LOCALHOST'
     assert os.environ['ROS_DOMAIN_ID'] != ours  # nobody else's

@@ -285,6 +285,7 @@ def test_packets_go_nowhere_else_than_into_pcapng(
     ['--port', 'x', '--save', 'y', '--html', './y'],
     ['x', '--report', 'r', '--conformance', 'y', '--html', 'y'],
     ['x', '--check', 'md5'], ['x', '--baud', '7'], ['x', '--conformance', 'y'],
+    ['--report', 'z', '--port', 'pty'], ['--anonymous', 'x'], ['--report', 'z', '--binary', 'x'],
     ['x', '--seconds', 'many'], ['x', '--seconds', '1_0'], ['x', '--baud', '9_600']])
 def test_option_that_is_wrong_is_told_with_status_2(capsys: Output, args: list[str]) -> None:
     with pytest.raises(SystemExit) as caught:
@@ -409,7 +410,9 @@ def test_what_a_slow_output_has_lost_is_told_and_saved(
     tap.chunks = lambda *args: iter(
         Chunk(time, Direction.UNKNOWN, frames.poll_frame(2)) for time in (0.0, 0.1, 0.2))
     monkeypatch.setattr(sniff, 'Tap', made := Mock(return_value=tap))
-    assert main(['--tap', 'x', 'pty', '--parity', 'Even', '--save', str(tmp_path / 'saved')]) == 0
+    options = '--save', str(tmp_path / 'saved'), '--html', str(page := tmp_path / 'page')
+    assert main(['--tap', 'x', 'pty', '--parity', 'Even', *options]) == 0
+    assert '>x, pty</' in page.read_text(encoding='utf-8')
     first, told = (f'{lost} of traffic lost: this output was too slow\n'
                    for lost in ('1 piece', '3 pieces'))
     assert capsys.readouterr().err.endswith(f'sniff: {first}sniff: {told}')

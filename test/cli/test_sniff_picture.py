@@ -269,12 +269,3 @@ def test_browser_shows_ten_thousand_frames_in_their_colours(
     page = long_line(tmp_path, capsys, 2000)
     assert page.stat().st_size < 4_000_000
     assert {(0xFB, 0xE3, 0xE1), (0x2E, 0x8B, 0x57)} <= browser.colours(page, tmp_path)
-
-
-def test_live_line_is_drawn_at_the_end(tmp_path: Path, capsys: Output) -> None:
-    page = tmp_path / 'live.html'
-    said = call(main, capsys, '--tap', 'pty', 'pty', '--seconds', '0.3', '--html', str(page))
-    assert said.status == 0, said
-    assert 'no fault' in page.read_text(encoding='utf-8')
-    nowhere = str(page / 'line.html')
-    assert call(main, capsys, '--port', 'pty', '--seconds', '0.1', '--html', nowhere).status == 2

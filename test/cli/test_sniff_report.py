@@ -249,12 +249,3 @@ def test_files_of_one_name_are_all_in_the_bundle(tmp_path: Path, capture: str) -
     assert files['capture/1_line.cap'] == '1.0 > 10 05\n'
     assert [files[f'settings/{name}'][:9] for name in ('net.csv', '1_net.csv', '2_net.csv')] == [
         'Station\n1', 'Station\n2', 'Station\n3']
-
-
-@pytest.mark.parametrize('args', [
-    ('--report', 'x.zip', '--port', 'pty'), ('--anonymous', 'line.cap'),
-    ('--report', 'x.zip', '--binary', 'line.bin')])
-def test_report_is_for_captures(args: tuple[str, ...]) -> None:
-    with pytest.raises(SystemExit) as end:
-        main(args)
-    assert end.value.code == 2

@@ -252,12 +252,6 @@ def test_nothing_is_asked_of_the_publishers(bridge: Bridge, watch: NodeWatch) ->
     assert not [name for name, _ in published if name != '/parameter_events']
 
 
-def test_node_that_is_not_known_yet_is_not_there(watch: NodeWatch) -> None:
-    assert watch.published(NAME) is None
-    watch.spin_once(0.0)
-    assert not watch.is_there
-
-
 @for_all(('text', 'name'), [
     ('abdf1', '/abdf1'), ('/abdf1', '/abdf1'), ('cell/line_a', NAME), ('/cell/line_a/', NAME)])
 def test_names_may_lack_the_slash_in_front(text: str, name: str) -> None:
