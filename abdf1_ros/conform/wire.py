@@ -178,7 +178,7 @@ class Wire:
         self._line.write(raw)
 
     def forget_reply(self) -> None:
-        """Take the last reply by radio, if it comes again, for an answer: nobody forwards it."""
+        """Take the next copy of the last reply by radio for an answer: no node forwards it."""
         self._last_reply = b''
 
     def hear(self, within: float | None = None, *, answers: bool = True) -> Symbol | None:

@@ -36,7 +36,7 @@ _PTY = 'pty'
 MOST_WAITING = 10_000
 
 
-class _Heard:
+class _Received:
     """What the readers have heard and the output has not taken yet."""
 
     def __init__(self) -> None:
@@ -62,7 +62,7 @@ def is_pty(name: str) -> bool:
 class _TapReader(threading.Thread):
     """Read a port, queue its bytes with their time, and pass them on at once."""
 
-    def __init__(self, port: Port, direction: Direction, onward: Port | None, heard: _Heard,
+    def __init__(self, port: Port, direction: Direction, onward: Port | None, heard: _Received,
                  wake: int) -> None:
         super().__init__(name=f'tap {direction.value}')
         self.stopping = False
@@ -99,7 +99,7 @@ class Tap:
     def __init__(self, names: Sequence[str], settings: PortSettings) -> None:
         self.names: list[str] = []
         self._settings = settings
-        self._heard = _Heard()
+        self._heard = _Received()
         with ExitStack() as stack:
             ports = [self._open(name, stack) for name in names]
             self._open_ports = stack.pop_all()

@@ -204,7 +204,7 @@ def test_signal_where_nothing_is_under_way_ends_quietly(
         raise KeyboardInterrupt
 
     module = import_module(COMMANDS[name][0])
-    monkeypatch.setattr(module if name == 'demo' else terminal, 'interruptible', interrupted)
+    monkeypatch.setattr(terminal, 'interruptible', interrupted)
     assert module.main(args) == status
 
 

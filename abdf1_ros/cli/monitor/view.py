@@ -165,7 +165,7 @@ class NodeView:
     - ``told``: clock value (s) of the last diagnostics; None before the first.
     - ``active``: stations of the Active Node Table; None before the first message.
     - ``results``: the newest first.
-    - ``stopped``: why its line does not run, from the process of many lines; empty if not told.
+    - ``stopped``: why its line does not run, as the process of many lines says; empty if unknown.
     """
 
     node: str
