@@ -214,6 +214,9 @@ def test_link_does_not_wait_for_a_handler_of_the_log(port: str) -> None:
     class Stuck(logging.Handler):
 
         def emit(self, record: logging.LogRecord) -> None:
+            if not threads:
+                threads.add(threading.current_thread())
+                plc.read('N7:0')  # it may ask a PLC, too
             threads.add(threading.current_thread())
 
     threads: set[threading.Thread] = set()
@@ -221,6 +224,7 @@ def test_link_does_not_wait_for_a_handler_of_the_log(port: str) -> None:
     logger.addHandler(Stuck())
     with client_with(port, timeout=0.1, retries=1, logger=logger) as plc:
         assert plc.start(9, identify()).wait(PATIENCE) and not threads
+        plc.read('N7:0')
     assert threads == {threading.current_thread()}  # in ``close``
 
 

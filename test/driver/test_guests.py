@@ -80,12 +80,14 @@ def test_reply_of_the_plc_comes_back_with_the_numbers_of_the_guest(mode: str, ds
     ((1,), 0, 1), ((1,), 2, 2), ((1, 3), 0, 2), ((1, 2), 0, 2)])
 def test_only_a_peer_with_one_plc_takes_any_dst(
         stations: tuple[int, ...], sts: int, meant: int) -> None:
-    rows = [make_mapping('N7:0', station=station) for station in stations]
+    rows = [make_mapping('N7:0', station=station, plc='SLC') for station in stations]
     driver = DriverBench(rows, network=Network(mode='Peer')).driver
     guests, driver.stations[1].has_gateway = driver.guests, sts > 0 or len(stations) > 1
-    guests.put(GuestCommand(Guest('hmi'), Packet(2, 9, 0x0F, 0, 1, READ_N7), 0.0, print))
+    guest = Guest('hmi', ShareAccess.ALL)
+    guests.put(GuestCommand(guest, Packet(2, 9, 0x0F, 0, 1, WRITE_N7), 0.0, print))
     job = guests.next(0.0, ())
-    assert job is not None and job.station == meant
+    assert job is not None and job.claim and job.station == meant
+    assert bool(job.claim.extents) is (meant in stations)  # the words of rows of this PLC
 
 
 def test_guest_waits_on_an_idle_line_no_longer_than_its_last_failure_asks_for() -> None:

@@ -116,6 +116,7 @@ def test_modes_in_a_sentence(mode: Mode, words: str) -> None:
     (0xB9, b'1766-LEC   ', 'MicroLogix 1400', Processor.ML1400, ()),
     (0x77, b'1747-L542B ', '1747-L542B', None, ()),
     (0x89, b'1764-LSP   ', 'MicroLogix 1500 LSP', Processor.ML1500, ()),
+    (0x8C, b'1764-LRP   ', 'MicroLogix 1500 LRP', Processor.ML1500, ()),
     (0x1A, b'500-20     ', 'SLC 500 fixed', Processor.SLC_5_01, ()),
     (0x78, b'5/04       ', 'SLC 5/04', Processor.SLC_5_04,
      ('its processor code 0x78 is that of a SLC 5/05',)),
