@@ -33,7 +33,7 @@ from support.ros import Process, write_csv
 MAP_TO_WRITE = ('Tag,Command,Address,Station,PLC_Type,Max,Fallback,Fallback_After,Scale', [
     'Level,ReadWrite,N7:55,2,SLC,10,,,0.5', 'speed,Read,N7:0,1,PLC5,,,,',
     'all,Write,N7:9,255,SLC,,,,', 'beat,Heartbeat,N7:56,2,SLC,,,,',
-    'valve,Write,N7:57,2,SLC,,0,1000,'])
+    'valve,Write,N7:57,2,SLC,,0,1000,', 'last,Write,N7:0,254,SLC,,,,'])
 
 
 def test_row_of_a_map_is_written_by_its_tag(plc: Plc, tmp_path: Path) -> None:
@@ -48,7 +48,7 @@ def test_row_of_a_map_is_written_by_its_tag(plc: Plc, tmp_path: Path) -> None:
 
 
 @for_all(('args', 'text'), [
-    (('level', '5'), '"level" is not a tag of this map; tags that can be written: Level, valve; '
+    (('level', '5'), '"level" is not a tag of this map; tags that can be written: Level, valve, last; '
                      'did you mean Level?'),
     (('speed', '5'), '"speed" is a Read row of station 1; tags'),
     (('beat', '5'), '"beat" is a Heartbeat row of station 2; tags'),
