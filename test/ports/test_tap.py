@@ -110,14 +110,15 @@ def test_what_a_program_leaves_at_its_end_is_not_changed(ptys: list[Pty]) -> Non
     descriptor = os.open(ptys[0].name, os.O_RDWR | os.O_NOCTTY)
     for hangs_up in (termios.HUPCL, 0):
         attributes = termios.tcgetattr(descriptor)
-        attributes[2] = attributes[2] & ~termios.HUPCL | hangs_up
+        attributes[:3] = [termios.ICRNL | termios.IXON, termios.OPOST,
+                          attributes[2] & ~termios.HUPCL | hangs_up]
         termios.tcsetattr(descriptor, termios.TCSANOW, attributes)
         open_port(listening_to(ptys[0], baud=19200)).close()
         after = termios.tcgetattr(descriptor)
         assert after[2] & termios.HUPCL == hangs_up
         assert not after[2] & termios.CRTSCTS
         assert after[4:6] == [termios.B19200, termios.B19200]
-        assert after[3] == 0  # raw: nothing is echoed
+        assert after[0] == after[1] == after[3] == 0  # raw: nothing is changed or echoed
     os.close(descriptor)
 
 
