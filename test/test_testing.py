@@ -15,6 +15,7 @@
 """The fixture for tests of cells: the whole example, and the test that its tutorial shows."""
 
 from collections.abc import Callable
+import os
 from pathlib import Path
 import re
 import subprocess
@@ -26,6 +27,7 @@ from unittest.mock import Mock
 
 from abdf1_ros.df1 import frames
 from abdf1_ros.problems import ConfigurationError
+from abdf1_ros.ros import observer
 from abdf1_ros.ros.topics.messages import latched_qos
 from abdf1_ros.testing import abdf1_cell, Bridge, Observer, PATIENCE, Plcs, SimulatedCell
 import pytest
@@ -99,6 +101,16 @@ def test_what_never_happens_is_named(
         cell.plcs.word('N7:0', station=9)
     with pytest.raises(ValueError, match='65536 is not a word'):
         cell.plcs.set('N7:0', 1, 0x10000)
+
+
+def test_domain_of_others_and_the_default_one_are_not_taken(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, 'getpid', lambda: 299)
+    claims = [observer.claim_domain() for _ in range(3)]
+    for _, claim in claims:
+        claim.close()
+    first, second, third = (domain for domain, _ in claims)
+    assert 0 not in (first, second, third) and first != second != third
 
 
 def test_what_can_never_come_is_told_at_once(abdf1_cell: Cells) -> None:  # noqa: F811
