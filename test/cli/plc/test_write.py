@@ -48,8 +48,8 @@ def test_row_of_a_map_is_written_by_its_tag(plc: Plc, tmp_path: Path) -> None:
 
 
 @for_all(('args', 'text'), [
-    (('level', '5'), '"level" is not a tag of this map; tags that can be written: Level, valve, last; '
-                     'did you mean Level?'),
+    (('level', '5'), '"level" is not a tag of this map; tags that can be written: Level, valve, '
+                     'last; did you mean Level?'),
     (('speed', '5'), '"speed" is a Read row of station 1; tags'),
     (('beat', '5'), '"beat" is a Heartbeat row of station 2; tags'),
     (('all', '5'), '"all" is a Write row of station 255; tags'),
