@@ -347,6 +347,10 @@ def test_broadcast_by_radio_reaches_every_plc(
         line.write(read)
         assert line.read(1.0) == heard
         line.write(late)
+    cast.say = (said := list[str]()).append
+    for command in ('counters 1', 'counters 2'):
+        cast.carry_out(command)
+    assert said[0][10:] == said[1][10:] and '=3 ' in said[0]  # the modem counts for every PLC
     cast.carry_out('power 2')
     links.return_value.exchange.assert_not_called()  # the modem has power
 
