@@ -32,7 +32,7 @@ table and the packet is not among the last packets.
 
 from __future__ import annotations
 
-from collections import defaultdict, deque
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 import math
@@ -73,7 +73,7 @@ _RECENT = 10.0
 # Most packets of ours that are remembered: nodes may forward them back to us.
 _MOST_SENT = 256
 
-# Most commands of one node that are remembered: a copy may be forwarded after many newer ones.
+# Most commands that are remembered: a copy may be forwarded after many newer ones.
 _MOST_EXECUTED = 256
 
 # Most replies and forwarded packets that wait for a quiet line. Further packets are dropped.
@@ -157,8 +157,7 @@ class RadioNode(EqualNode):
         # Link data to be sent, and until when (clock value in s).
         self._waiting: deque[tuple[bytes, float]] = deque()
         self._heard: deque[tuple[bytes, float]] = deque(maxlen=_MOST_HEARD)  # and when heard
-        self._executed: defaultdict[int, deque[_Executed]] = defaultdict(
-            lambda: deque(maxlen=_MOST_EXECUTED))  # by SRC
+        self._executed: deque[_Executed] = deque(maxlen=_MOST_EXECUTED)
         self._under_way: dict[int, _SentCommand] = {}  # by station
         self._sent: deque[bytes] = deque(maxlen=_MOST_SENT)
         self._begun = self._machine.now
@@ -342,7 +341,9 @@ class RadioNode(EqualNode):
 
     def _take_command(self, command: Packet) -> None:
         """Execute a command once; when it is repeated, send its reply again."""
-        now, executed = self._machine.now, self._executed[command.src]
+        now, executed = self._machine.now, self._executed
+        while executed and now - executed[0].when >= self._repetition_time:
+            executed.popleft()
         known = self._repeated(command, now)
         if known is not None:
             self._counters.duplicate_messages += 1
@@ -369,10 +370,10 @@ class RadioNode(EqualNode):
         may come after the next command.
         """
         last: _Executed | None = None
-        for known in reversed(self._executed[command.src]):
-            if known.command.tns == command.tns:
+        for known in reversed(self._executed):
+            if (known.command.src, known.command.tns) == (command.src, command.tns):
                 last = last or known
-                if known.command == command and now - known.when < self._repetition_time and (
+                if known.command == command and (
                         known is last or self._may_be_forwarded(known, now)):
                     return known
         return None
