@@ -196,6 +196,10 @@ def test_word_that_was_refused_alone_is_not_read_with_others_after_a_search() ->
     plc.settle()
     assert plc.spans() == [(0, 50), (50, 51), (51, 110), (115, 116)]
     assert all(block.words == 1 for block in plc.asked if block.span.end == 116)
+    plc = Plc(words(*range(110)))
+    plc.packet = 80  # both halves are good, and stay apart
+    plc.settle()
+    assert (plc.spans(), plc.refused) == ([(0, 55), (55, 110)], 1)
 
 
 def test_each_file_that_comes_back_is_planned_once() -> None:

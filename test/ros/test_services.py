@@ -305,7 +305,8 @@ def test_call_to_a_bridge_that_is_killed_is_not_executed_by_the_next(tmp_path: P
             observer.wait(lambda: False, 0.5)
             node.send(signal.SIGKILL)
         with Process('node', *files.args()) as node:
-            assert answer_of(observer, client, SetBool.Request(data=False)).message == 'written'
+            observer.until(lambda: answer_of(  # at first its port may not be open
+                observer, client, SetBool.Request(data=False)).message == 'written', 'a write')
         assert not lost.done()
         assert {details(result)['value'] for result in results} == {'[0]'}
 
