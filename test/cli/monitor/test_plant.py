@@ -139,9 +139,10 @@ def test_spares_stand_beside_the_line_that_has_an_owner(
         assert lines['/hall/a'].worst(lines['/hall/a'].told).style is Style.GOOD
         monkeypatch.setattr(view, 'SILENCE', 0.3)  # for so long there is no owner
         publish(watch, lambda lines: f'{nobody}beta' in str(lines['/hall/a']), waiting[0])
-        later = time.monotonic() + SILENCE
-        monkeypatch.setattr(time, 'monotonic', lambda: later)
+        before = time.monotonic
+        monkeypatch.setattr(time, 'monotonic', lambda: before() + SILENCE)
         assert {line.name: line.spares for line in watch.lines()} == {'/hall/a': []}
+        publish(watch, lambda lines: f'{nobody}beta' in str(lines['/hall/a']), waiting[0])
 
 
 def test_spare_is_named() -> None:
