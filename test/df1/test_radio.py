@@ -172,8 +172,8 @@ def test_repetition_is_known_whatever_many_others_have_sent_since() -> None:
         bench.wait(3.0)
         bench.hear(*(framed(THEIRS._replace(src=src, tns=tns)) for tns in range(30)))
     bench.wait(3.0)
-    bench.hear(framed(THEIRS))
-    assert (bench.executed[PLC, THEIRS.tns], len(bench.executed)) == (1, 35)
+    bench.hear(framed(THEIRS._replace(src=3)), framed(THEIRS))
+    assert (bench.executed[PLC, THEIRS.tns], len(bench.executed)) == (1, 36)
 
 
 def test_sender_that_always_counts_zero_is_served_after_a_while() -> None:
