@@ -26,7 +26,7 @@ from collections.abc import Callable
 import math
 
 from abdf1_ros.df1.accounting import Accounting
-from abdf1_ros.df1.frames import Frame
+from abdf1_ros.df1.frames import Frame, Symbol
 from abdf1_ros.df1.link import Link, LinkState
 from abdf1_ros.df1.machine import Machine, Procedure, Rest, Silence
 from abdf1_ros.df1.mode import LineMode
@@ -76,11 +76,9 @@ class SlaveLink(Link, Initiator):
         while True:
             # Look at fixed times, not after a pause, because the line may never be quiet.
             symbol = yield Rest(max(0.0, next_look - self._machine.now))
-            # A master that still waits for an ACK repeats a message that may be old.
-            is_old = isinstance(symbol, Frame) and self._machine.may_be_old
-            if not isinstance(symbol, Silence) and not is_old:
+            if not isinstance(symbol, Silence):
                 try:
-                    yield from answer(self._machine, symbol, self._slave.respond,
+                    yield from answer(self._machine, symbol, self._respond,
                                       lambda: self._look_after(source), self._expiry)
                 except CommandExpired as error:
                     self._take_back(error)
@@ -88,6 +86,11 @@ class SlaveLink(Link, Initiator):
             if self._machine.now >= next_look:
                 self._look_after(source)
                 next_look = self._machine.now + TICK
+
+    def _respond(self, symbol: Symbol) -> bytes:
+        """Return the answer; ignore an old message: a master that still waits repeats it."""
+        is_old = isinstance(symbol, Frame) and self._machine.may_be_old
+        return b'' if is_old else self._slave.respond(symbol)
 
     def _serve_own(self, command: Packet) -> Packet:
         """Execute a command for us; refuse a command for another node: we are not a gateway."""
