@@ -140,7 +140,7 @@ def test_silent_line_is_listened_to_at_one_speed(
     (POLL + b'\x10\x05\x03\xFE', b'', 'None')])
 def test_two_polls_or_messages_with_a_good_check_show_a_master(
         monkeypatch: pytest.MonkeyPatch, said: bytes, later: bytes, told: str) -> None:
-    heard = {(38400, False): b'\xF0', (9600, False): said, (9600, True): later}
+    heard = {(38400, False): b'\x10\x05\x09\xF7', (9600, False): said, (9600, True): later}
     clock = Clock()
     monkeypatch.setattr(overhear, 'time', SimpleNamespace(monotonic=clock))
 
