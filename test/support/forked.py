@@ -21,7 +21,8 @@ A fork has arguments, environment, folder, standard streams and an exit status o
 
 from collections.abc import Sequence
 from contextlib import suppress
-from multiprocessing import get_context
+import fcntl
+from multiprocessing import get_context, parent_process
 from multiprocessing.connection import Connection
 import os
 from pathlib import Path
@@ -102,6 +103,11 @@ def _opened(descriptor: int, mode: str) -> IO[str]:
 def _run(program: str | Path, args: Sequence[str], environment: dict[str, str], folder: str,
          streams: Sequence[Connection]) -> None:
     """Be the process, in the child."""
+    # The tests hold the other end of this pipe: if they are killed, so are we.
+    tests = parent_process().sentinel  # type: ignore[union-attr]
+    fcntl.fcntl(tests, fcntl.F_SETSIG, signal.SIGKILL)
+    fcntl.fcntl(tests, fcntl.F_SETOWN, os.getpid())
+    fcntl.fcntl(tests, fcntl.F_SETFL, os.O_ASYNC)
     for number, stream in enumerate(streams):
         os.dup2(stream.fileno(), number)
         stream.close()

@@ -14,10 +14,22 @@
 
 """What fails among many cases is named, and nothing is left out."""
 
+import os
 from pathlib import Path
+import select
+import subprocess
+import sys
 
 import pytest
 from support.cases import for_all
+
+SESSION = """\
+from pathlib import Path
+from support.forked import Forked
+program = Forked(Path({!r}), [])
+print(program.stdout.readline(), end='', flush=True)
+program.wait()
+"""
 
 taken: list[tuple[int, str]] = []
 
@@ -63,3 +75,13 @@ def test_failure_is_named() -> None:
         ['case: number = 5'], ['case: number = 6']]
     with pytest.raises(AssertionError):  # a table that was renamed would test nothing
         for_all('path', [])
+
+
+def test_program_ends_with_the_killed_session_that_started_it(tmp_path: Path) -> None:
+    program = tmp_path / 'endless.py'
+    program.write_text('import os, time\nprint(os.getpid(), flush=True)\ntime.sleep(300)')
+    with subprocess.Popen([sys.executable, '-c', SESSION.format(str(program))],
+                          cwd=Path(__file__).parents[1], stdout=subprocess.PIPE) as session:
+        ends = os.pidfd_open(int(session.stdout.readline()))  # type: ignore[union-attr]
+        session.kill()
+    assert select.select([ends], [], [], 20.0)[0]
