@@ -295,7 +295,7 @@ def sections(files: Sequence[str], own_name: str = NODE_NAME) -> dict[str, list[
     problems = []
     for path in dict.fromkeys(files):
         for name, line, _ in node_sections(parameter_tree(path)):
-            if _short(name) in (NODE_NAME, own_name) or '*' in name:
+            if name in (f'/{NODE_NAME}', f'/{own_name}') or '*' in name:
                 continue
             places = found.setdefault(name, [])
             if places and places[-1].file == path:

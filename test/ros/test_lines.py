@@ -74,8 +74,8 @@ def yaml_file(folder: Path, text: str) -> str:
      ['/press/press_plc', '/press/other']),
     ('abdf1:\n  ros__parameters: {a: 1}', ['/abdf1']),
     ('/**:\n  ros__parameters: {a: 1}\n/*/x:\n  ros__parameters: {}', []),
-    ('lines:\n  ros__parameters: {lines: [x]}\nx:\n  ros__parameters: {}\n'
-     'host_b: {ros__parameters: {}}', ['/x']),
+    ('lines:\n  ros__parameters: {lines: [x]}\nx/lines:\n  ros__parameters: {}\n'
+     'host_b: {ros__parameters: {}}', ['/x/lines']),
     ('', [])])
 def test_nodes_of_a_parameter_file(tmp_path: Path, text: str, expected: list[str]) -> None:
     assert [*sections(2 * [yaml_file(tmp_path, text)], 'host_b')] == expected
