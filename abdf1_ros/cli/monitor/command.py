@@ -311,6 +311,8 @@ def _find(watch: NodeWatch, seconds: float, has_ended: _Ending) -> bool:
 
 
 def _not_found(watch: NodeWatch, seconds: float) -> str:
+    if watch.stopped:
+        return f'{watch.name} {watch.stopped}'
     bridges = watch.bridges()
     if watch.name in bridges:
         return (f'{watch.name} is visible, but sent no message within {seconds:g} s: programs on '

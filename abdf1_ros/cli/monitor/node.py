@@ -100,6 +100,8 @@ class NodeWatch(Listening):
     The bridge is not affected: subscriptions request only the QoS that every bridge offers, no
     service is called, and no message is published. Ages of topics without a promised time count
     from the publisher's time stamp. For these topics the clocks of the hosts must agree.
+
+    ``stopped``: why its line does not run, as the process of many lines says; empty if unknown.
     """
 
     def __init__(self, name: str, ros_arguments: list[str]) -> None:
@@ -108,7 +110,7 @@ class NodeWatch(Listening):
         self._subscriptions: dict[str, _Subscription] = {}
         self._statuses: list[ShownStatus] = []
         self._told: float | None = None
-        self._stopped = ''
+        self.stopped = ''
         self._active: list[int] | None = None
         self._results: deque[ShownStatus] = deque(maxlen=_RESULTS_KEPT)
         self._next_discovery = 0.0
@@ -142,7 +144,7 @@ class NodeWatch(Listening):
                     for topic in sorted(self._subscriptions, key=by_number)]
         return NodeView(
             self.name, self.is_there, self._told, tuple(self._statuses), readings,
-            self._active, tuple(self._results), graph_hint(), self._stopped)
+            self._active, tuple(self._results), graph_hint(), self.stopped)
 
     def _discover(self) -> None:
         """Subscribe to the read topics that the node publishes now."""
@@ -198,7 +200,7 @@ class NodeWatch(Listening):
 
     def _take_diagnostics(self, message: DiagnosticArray) -> None:
         statuses, now = shown_statuses(message, self.name.lstrip('/')), time.monotonic()
-        self._stopped = '' if statuses else stopped_lines(message).get(self.name, self._stopped)
+        self.stopped = '' if statuses else stopped_lines(message).get(self.name, self.stopped)
         is_owner_heard = self._told is not None and not is_spare(self._statuses) \
             and now - self._told <= silence(self._statuses)
         if statuses and not (is_spare(statuses) and is_owner_heard):

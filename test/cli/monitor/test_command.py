@@ -31,6 +31,7 @@ from unittest.mock import MagicMock, Mock
 from abdf1_ros.cli.monitor.command import main, Screen
 from abdf1_ros.cli.monitor.node import NodeWatch
 from abdf1_ros.cli.monitor.view import Style, TextLine
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 import pytest
 from std_msgs.msg import UInt16MultiArray
 from support.commands import call, Output
@@ -405,12 +406,24 @@ def test_a_node_that_is_not_there_is_said_with_those_that_are(
     assert refused(0, '--node', '/abdf1') == []  # the user ends the search
 
 
-def test_topics_without_a_node_that_is_heard_point_to_another_user(refused: Refused) -> None:
+def test_reason_is_told_for_a_node_that_is_not_heard(
+        refused: Refused, monkeypatch: pytest.MonkeyPatch) -> None:
     with Observer() as observer:
         observer.node.create_publisher(UInt16MultiArray, '/ghost/active_stations', 1)
         assert refused(1, '--node', 'ghost', '--wait', '4')[-1] == (
             'monitor: /ghost is visible, but sent no message within 4 s: programs on one '
             'machine must run as the same user')
+        publisher = observer.node.create_publisher(DiagnosticArray, '/diagnostics', 1)
+        status = DiagnosticStatus(name='lines: lines', values=[KeyValue(key='/gone', value='why')])
+
+        def wait(watch: NodeWatch, *_: object) -> None:
+            publisher.publish(DiagnosticArray(status=[status]))
+            watch.spin_once(0.1)
+            return None if watch.stopped else wait(watch)
+
+        monkeypatch.setattr(NodeWatch, 'wait', wait)
+        assert refused(1, '--node', 'gone', '--wait', '0.1')[-1] == (
+            'monitor: /gone does not run: why')
 
 
 @pytest.mark.parametrize(('args', 'text'), [
