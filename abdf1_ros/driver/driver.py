@@ -166,7 +166,7 @@ class Driver:
         stands = (self._standing,) if repeated else ()
         record.connect((self._read_backs, self.readings.reads, self.interlocks, *stands),
                        (self._read_backs, *compares, *stands))
-        self.tasks = JobTasks(network.station, settings.first_tns, network.timing.char_time)
+        self.tasks = JobTasks(network.station, settings.first_tns, machine)
         self._agenda = Agenda(self.stations, self.interlocks, self._writes, self.checks,
                               self.readings.reads, self.guests, self.tasks)
 

@@ -58,8 +58,8 @@ class Job:
       guests' commands expire by age. A heartbeat expires when its conditions may have ended. A 0
       and a Fallback never expire. The link checks it for all kinds before it sends; the queues
       also end expired jobs, so that their results are not late.
-    - ``patience``: a later command expires this many seconds after the command before it, not
-      counting that command's time on the line, but not after ``latest`` (clock value in s).
+    - ``patience``: a later command expires this many seconds after the reply to the command
+      before it, but not after ``latest`` (clock value in s). A pause of the process counts.
     - ``is_probe``: a silent station is asked whether it answers again.
     - ``is_own``: a heartbeat or a fallback, which no message has asked for.
     - ``blames``, ``answer_within``: see ``Task``.
@@ -130,9 +130,9 @@ class Job:
             return
         self.sent, self.reply_size = False, 0
         if self.patience:
-            line_time = len(self.command.encode()) * self._tasks.char_time
-            expires = max(self.expires, self.taken + line_time + self.patience)
-            self.expires = min(self.latest, expires)
+            line = self._tasks.line
+            replied = self.taken + line.took(self.taken, line.now)
+            self.expires = min(self.latest, max(self.expires, replied + self.patience))
         self.command = self._tasks.new_command(self.station, request)
         self._tasks.advanced(self)
 
@@ -143,15 +143,15 @@ class JobTasks:
 
     - ``under_way``: all jobs; ``waiting``: the jobs whose next command waits to be sent.
     - ``station``: our own; ``first_tns``: the number before the first.
+    - ``line``: its clock.
     - ``transactions``: number of replies.
     - ``is_heard``: a reply has come on this connection, or none is needed (rule 26).
-    - ``char_time``: seconds of a character.
     - ``next_expiry``: when the first waiting command expires (clock value in s), infinite for
       never.
     """
 
-    def __init__(self, station: int, first_tns: int, char_time: float = 0.0) -> None:
-        self.char_time = char_time
+    def __init__(self, station: int, first_tns: int, line: LineTime) -> None:
+        self.line = line
         self.transactions = 0
         self.is_heard = True
         self._station = station

@@ -104,7 +104,7 @@ class Requests(TaskSource):
         self._may_store = may_store and not mode.is_polled
         self.counters, self.stations = Counters(), stations
         self.machine = mode.make_machine(line, self._run, self.counters)
-        self._tasks = JobTasks(line.station or 0, first_tns)
+        self._tasks = JobTasks(line.station or 0, first_tns, self.machine)
         self._waiting: Inbox[_RequestJob] = Inbox()
         self._taken: list[_RequestJob] = []  # in the link thread; they wait for their stations
         self._lost: LinkError = PortLost('not opened yet')

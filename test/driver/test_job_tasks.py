@@ -29,6 +29,7 @@ from support.mappings import make_mapping
 
 OURS = 5
 NOW = 50.0
+LINE = Mock(now=NOW, took=lambda begun, now: now - begun - 0.5)  # after a pause of 0.5 s
 
 
 class TwoRequests(Job):
@@ -57,7 +58,7 @@ class TwoRequests(Job):
 
 
 def test_job_is_one_command_after_the_other() -> None:
-    job, tasks = TwoRequests(reply_size=20), JobTasks(OURS, 0x10)
+    job, tasks = TwoRequests(reply_size=20), JobTasks(OURS, 0x10, LINE)
     task = job.start(tasks, NOW)
     assert (task.command, task.reply_size) == (Packet(1, OURS, 0x0F, 0, 0x11, b'a'), 20)
     assert tasks.first(()) is None  # whoever has started it sends it
@@ -75,14 +76,14 @@ def test_job_is_one_command_after_the_other() -> None:
 
 @for_all('station', [1, BROADCAST])
 def test_reply_of_a_station_is_heard_and_the_end_of_a_broadcast_is_not(station: int) -> None:
-    (tasks := JobTasks(OURS, 0)).connect()
+    (tasks := JobTasks(OURS, 0, LINE)).connect()
     task = TwoRequests(station).start(tasks, NOW)
     task.reply(task.command.reply())
     assert tasks.is_heard is (station != BROADCAST)
 
 
 def test_error_ends_the_job_and_says_whether_the_command_was_sent() -> None:
-    tasks = JobTasks(OURS, 0)
+    tasks = JobTasks(OURS, 0, LINE)
     for was_sent in (False, True):
         job = TwoRequests()
         task = job.start(tasks, NOW)
@@ -95,7 +96,7 @@ def test_error_ends_the_job_and_says_whether_the_command_was_sent() -> None:
 
 
 def test_all_jobs_end_with_the_port() -> None:
-    jobs, tasks = (TwoRequests(1, NOW + 9.0), TwoRequests(2)), JobTasks(OURS, 0)
+    jobs, tasks = (TwoRequests(1, NOW + 9.0), TwoRequests(2)), JobTasks(OURS, 0, LINE)
     first, _ = (job.start(tasks, NOW) for job in jobs)
     first.reply(first.command.reply(b'one'))
     tasks.fail(PortLost('unplugged'))
@@ -110,7 +111,7 @@ def test_error_in_a_job_ends_it() -> None:
             yield 0x0F, b''
             raise ZeroDivisionError
 
-    job, tasks = Faulty(), JobTasks(OURS, 0)
+    job, tasks = Faulty(), JobTasks(OURS, 0, LINE)
     task = job.start(tasks, NOW)
     with pytest.raises(ZeroDivisionError):
         task.reply(task.command.reply())
@@ -132,7 +133,7 @@ def test_job_that_fails_before_its_first_command_has_ended_too() -> None:
 
 
 def test_transaction_number_is_passed_over_when_a_whole_round_lies_between() -> None:
-    tasks = JobTasks(OURS, 7)
+    tasks = JobTasks(OURS, 7, LINE)
 
     def number(station: int) -> int:
         return tasks.new_command(station, (0x06, b'')).tns
@@ -145,7 +146,7 @@ def test_transaction_number_is_passed_over_when_a_whole_round_lies_between() -> 
 
 
 def test_job_that_the_garbage_collector_has_ended_is_left_alone() -> None:
-    job, tasks = TwoRequests(), JobTasks(OURS, 0)
+    job, tasks = TwoRequests(), JobTasks(OURS, 0, LINE)
     job.start(tasks, NOW)
     assert job.under_way is not None
     job.under_way.close()
@@ -154,18 +155,17 @@ def test_job_that_the_garbage_collector_has_ended_is_left_alone() -> None:
 
 
 @for_all('expires', [NOW + 1.5, NOW + 9.0])
-def test_command_expires_by_the_request_or_by_the_command_before(expires: float) -> None:
-    tasks = JobTasks(OURS, 0, char_time=0.01)
-    task = TwoRequests(expires=expires, patience=2.0).start(tasks, NOW)
-    size = len(task.command.encode())
+def test_command_expires_by_the_request_or_by_the_reply_before(expires: float) -> None:
+    tasks = JobTasks(OURS, 0, LINE)
+    task = TwoRequests(expires=expires, patience=2.0).start(tasks, NOW - 4.0)
     task.reply(task.command.reply())
-    assert task.expires == pytest.approx(max(expires, NOW + 2.0 + 0.01 * size))
+    assert task.expires == max(expires, NOW - 0.5 + 2.0)
     assert tasks.next_expiry == task.expires
 
 
 @pytest.mark.parametrize('after, errors', [(-0.001, 0), (0.0, 1), (4.0, 1)])
 def test_job_ends_whose_next_command_has_waited_too_long(after: float, errors: int) -> None:
-    job, tasks = TwoRequests(expires=NOW + 2.0, patience=2.0), JobTasks(OURS, 0)
+    job, tasks = TwoRequests(expires=NOW + 2.0, patience=2.0), JobTasks(OURS, 0, LINE)
     task = job.start(tasks, NOW)
     task.sent = True
     task.reply(task.command.reply())

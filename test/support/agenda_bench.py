@@ -73,7 +73,7 @@ class Bench:
         self.results: list[WriteResult] = []
         self.begun: dict[Write, WriteJob] = {}
         self.stations = ActiveStationList([job.station for job in jobs], probe_time=PROBE_TIME)
-        self.tasks, line = JobTasks(5, 0), StillClock()
+        self.tasks = JobTasks(5, 0, line := StillClock())
         listener = Recorder(lambda: 0.0)
         self.record = WriteRecord(line, 1.0)
         readings = Readings(Network(), Rows(), DriverSettings(), self.stations, line, listener,
