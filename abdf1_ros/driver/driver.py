@@ -292,13 +292,12 @@ class Driver:
         """
         Return the station that a guest means.
 
-        In Mode Peer this is the one PLC, whatever the DST. If a gateway answers for it, or for
-        several stations, the DST decides.
+        In Mode Peer with rows of one station this is the one PLC, whatever the DST. Only the map
+        decides this: a guest's writes must not go elsewhere after a gateway has reported a fault.
         """
-        stations = [*self.stations]
-        is_only = self.network.line_mode.has_one_plc and len(stations) == 1 \
-            and not stations[0].has_gateway
-        return stations[0].number if is_only else dst
+        stations = [station.number for station in self.stations]
+        is_only = self.network.line_mode.has_one_plc and len(stations) == 1
+        return stations[0] if is_only else dst
 
     def _words_of_guest(self, command: Packet, station: int) -> list[Extent] | None:
         # A PLC-5 has separate words for each station number that sends it PLC-2 writes. On the
