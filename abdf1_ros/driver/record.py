@@ -243,6 +243,13 @@ class WriteRecord:
         for listener in self._listeners:
             listener.opened(behind, until)
 
+    def take_over(self, before: WriteRecord) -> None:
+        """Take what may still land on the same words of the record before."""
+        for words in self._words.values():
+            for row, theirs in before._words.items():
+                if row.extent.meets(words.row.extent):
+                    words.may_land((_Writer.BEFORE,), theirs.lands_until)
+
     def may_begin(self, row: Mapping) -> bool:
         """Tell whether no write of these words is under way: packets of writes must not mix."""
         return not any(claim.meets(row.extent) for claim in self._under_way)

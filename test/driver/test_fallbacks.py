@@ -98,6 +98,8 @@ def test_rule_10_write_that_may_land_after_the_begin_of_a_fallback_has_it_writte
     assert one.row.words.again_at == again
     assert one.row.is_confirmed is (again == math.inf)
     assert one.row.judge(begun + 1.0, -math.inf) is (again < math.inf)
+    (new := OneRow()).record.take_over(one.record)  # new files change nothing in the PLC
+    assert new.row.words.lands_until == (2.0 if again < math.inf else -math.inf)
 
 
 @pytest.mark.parametrize(('processor', 'again'), [('ML1000', 1.0), ('5/03', math.inf)])

@@ -102,8 +102,10 @@ def test_rows_come_and_go_and_those_that_stay_are_not_disturbed(bench: Bench) ->
     speeds.values([7, 8])
     publisher, = (each for each in bench.node.publishers if each.topic_name == speeds.topic)
     bench.write_map(SPEED, LEVEL)
+    bench.node.session.driver.stations[1].has_gateway = True  # by an STS
     assert bench.reload() == (True, (
         f'{bench.node.session.configuration}; new: level; gone: recipe'))
+    assert bench.node.session.driver.stations[1].has_gateway
     assert values_in(bench.ros.listen(Float32MultiArray, '/abdf1/read/level').first()) == [1.5]
     assert values_in(speeds.next()) == [7, 8]
     assert publisher in bench.node.publishers

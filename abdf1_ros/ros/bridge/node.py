@@ -223,8 +223,8 @@ class BridgeNode(AnsweringNode):
         The order matters:
         1. Inform the PLCs: to a PLC, new files are an end and a start.
         2. Make the new session while the old session has the line: topics of unchanged rows stay.
-        3. Put the machine of the new session on the line, with the words of Serve rows, end the
-           old session, begin the new one.
+        3. Put the machine of the new session on the line, with what the old driver knows, end
+           the old session, begin the new one.
         4. Let guests connect, and give up the old port.
         """
         tell_plcs([self.session], 'goes on with new files', HAND_OVER)
@@ -244,8 +244,7 @@ class BridgeNode(AnsweringNode):
         if not self.link.exchange(session.driver.machine, session.reads.publish_later_values,
                                   self._opener.use(_port_settings(configuration),
                                                    _head(configuration.network)),
-                                  take_over=partial(session.driver.served.take_over,
-                                                    before.driver.served)):
+                                  take_over=partial(session.driver.take_over, before.driver)):
             return False
         before.end()
         self.session.begin()
