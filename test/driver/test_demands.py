@@ -16,6 +16,7 @@
 
 from dataclasses import replace
 from functools import partial
+from itertools import pairwise
 import math
 
 from abdf1_ros.df1.packet import Packet
@@ -222,12 +223,12 @@ def test_station_that_has_become_late_is_answered_at_once() -> None:
 
 
 def test_station_that_dies_during_the_read_is_told() -> None:
-    for row in (RECIPE, SPEED, TABLE):
-        line = Line(row, run=6.0)
+    for row, other in pairwise((RECIPE, SPEED, TABLE, RECIPE)):
+        line = Line(row, other, run=6.0)
         line.there.faults.silent = True
+        line.ask(other)
         line.ask(row, run=30.0)
-        (when, _, answer), = line.answers
-        assert answer.error[:4] in (INACTIVE, '2508')
+        assert [each[:4] in (INACTIVE, '2508') for each in line.errors] == [True] * 2
         line.there.faults.silent = False
         line.run(10.0)
         assert bool(line.listener.values(row)) is not row.is_on_demand

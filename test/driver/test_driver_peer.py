@@ -210,7 +210,7 @@ def test_nothing_is_lost_or_mixed_up_when_everything_happens_at_once(
 
 
 def test_dead_line_fails_reads_and_writes_and_all_goes_on_when_it_is_back() -> None:
-    read, write = make_mapping(), make_mapping('N7:5', 'Write')
+    read, write = make_mapping(via=9), make_mapping('N7:5', 'Write')  # a peer is not asked Via
     pushed = make_mapping('N7:50', 'Serve', station=PLC)  # we have the number of the PLC
     bench = Bench([read, write, pushed])
     bench.open(run=0.5)

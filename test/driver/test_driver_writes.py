@@ -101,9 +101,9 @@ def test_write_that_comes_just_when_the_port_is_lost_is_refused() -> None:
     bench, _ = bench_of(row)
     bench.lose_port()
     bench.driver.is_online = True  # as another thread saw it a moment ago
-    bench.driver.write([row], [1], bench.clock())
-    assert [str(result) for result in bench.listener.results] == [
-        'not written: refused: the port is not open']
+    bench.driver.write([row], [1], bench.clock(), 'r7')
+    assert [(str(result), result.request) for result in bench.listener.results] == [
+        ('not written: refused: the port is not open', 'r7')]
 
 
 def test_every_write_has_one_result_while_the_port_comes_and_goes() -> None:
