@@ -369,10 +369,10 @@ def test_result_tells_value_latency_and_request() -> None:
     ([1, 0, 1], '[1, 0, 1]'), ([], '[]'), ("it's", '"it\'s"'),
     ('\x1b[2J\r\n\0\x9bä', r"'\x1b[2J\r\n\x00\x9bä'"), ([0.1, -2.5], '[0.1, -2.5]'),
     (array('f', [0.1]), '[0.1]'), ([1234567, -2147483648], '[1234567, -2147483648]'),
-    ('a' * 100, repr('a' * 100)), ('a' * 102, repr('a' * 100) + ' and 2 more characters'),
+    ('a' * 100, repr('a' * 100)), ('a' * 101, repr('a' * 100) + ' and 1 more characters'),
     ([4294967295], '[4294967295]'), (array('f', [1234567, 0.3]), '[1234567, 0.3]'),
     (list(range(16)), str(list(range(16)))),
-    (list(range(18)), str(list(range(16)))[:-1] + ', and 2 more]')])
+    (list(range(17)), str(list(range(16)))[:-1] + ', and 1 more]')])
 def test_values_are_shown_short_and_exact(values: list[float] | str, text: str) -> None:
     assert show(values) == text
 

@@ -31,7 +31,7 @@ from abdf1_ros.df1.slave_link import SLAVE
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.inbox import Inbox
 from abdf1_ros.driver.requests import Requests
-from abdf1_ros.errors import LinkError, PortLost, StationInactive
+from abdf1_ros.errors import INTERNAL_ERROR, LinkError, PortLost, StationInactive
 from abdf1_ros.pccc import diagnostics
 from abdf1_ros.pccc.dialect import Steps
 from abdf1_ros.pccc.steps import echo, identify
@@ -126,16 +126,21 @@ def test_errors_end_only_their_own_request() -> None:
     assert bench.requests.counters.commands_sent == 3  # no question, as the PLC has answered
 
 
-@pytest.mark.parametrize(('may_store', 'commands'), [(True, [2, 1, 1, 2]), (False, [1] * 4)])
+@pytest.mark.parametrize(('may_store', 'commands'), [
+    (True, [2, 1, 1, 2, 2]), (False, [1] * 5)])
 def test_rule_26_port_that_may_store_gets_a_question_before_the_first_write_and_after_a_failure(
         may_store: bool, commands: list[int]) -> None:
-    bench, sent = Bench(may_store=may_store), list[int]()
-    for station in (1, 1, 9, 1):
+    refuses = HalfDuplexSlave(LinkSettings(station=1), lambda command: command.reply(sts=0x10))
+    bench, sent = Bench(slave=refuses, may_store=may_store), list[int]()
+    for station in (1, 1, 9, 1, 1):
+        if len(sent) == 4:
+            bench.requests.machine.stop(PortLost('unplugged'))
+            bench.line.start()
         before = bench.requests.counters.commands_sent
         bench.add(station, (write for write in [WRITE]))
         bench.run()
         sent.append(bench.requests.counters.commands_sent - before)
-    assert (sent, len(bench.ends.results)) == (commands, 3)
+    assert (sent, len(bench.ends.results)) == (commands, 4)
 
 
 @pytest.mark.parametrize(('mode', 'cmd'), [
@@ -149,6 +154,7 @@ def test_rule_26_question_also_goes_before_the_next_packet_of_a_write(
     assert write and other
     write.reply(write.command.reply())
     other.fail(StationInactive(2))
+    assert requests.next_task(0.0, (1,)) is None
     question = requests.next_task(0.0)
     assert question and (question.command.dst, question.command.cmd) == (1, cmd)
 
@@ -200,6 +206,7 @@ def test_stray_reply_is_kept() -> None:
     bench.add(1, echo(b'x'))
     bench.run()
     assert str(bench.ends.errors[0]) == '2508 ERR_COMMAND_TIMEOUT: Command Timed Out'
+    assert bench.requests.counters.naks_sent == 0  # others of a line in use would drop theirs
     assert bench.requests.stray == (
         '2510 ERR_WRONG_MESSAGE: Wrong Message Received Src:0x09, Dst:0x05, Tns:0x0008 '
         '[station 1]')
@@ -237,7 +244,10 @@ def test_station_has_one_request_at_a_time_by_radio() -> None:
     assert {b'\x01', b'\x02'} <= asked  # another station does not wait for the first
 
 
-def test_request_that_waits_for_its_station_ends_with_the_port() -> None:
+@pytest.mark.parametrize(('error', 'reason'), [
+    (PortLost('gone'), 'gone'), (TypeError('a bug'), INTERNAL_ERROR)])
+def test_request_that_waits_for_its_station_ends_with_the_port(
+        error: Exception, reason: str) -> None:
     requests = Requests(RADIO, replace(NETWORK.line, avoids_collisions=True),
                         ActiveStationList(), first_tns=7)
     ends = Ends()
@@ -245,9 +255,9 @@ def test_request_that_waits_for_its_station_ends_with_the_port() -> None:
     for _ in range(2):
         requests.add(1, echo(b''), ends.results.append, ends.errors.append)
     requests.machine.wake(0.0)
-    requests.machine.stop(PortLost('gone'))
+    requests.machine.stop(error)
     requests.machine.start(1.0)
-    assert [type(error) for error in ends.errors] == [PortLost] * 2
+    assert [str(error) for error in ends.errors] == [f'port lost: {reason}'] * 2
     assert requests.machine.data_to_send() == b''
 
 
