@@ -73,8 +73,7 @@ def test_interval_is_between_two_good_reads_without_a_failure() -> None:
     new.update(b'\1\0', 9.5)
     assert new.interval == 0.5
     new.withhold('not in RUN', 10.0)
-    new.update(b'\1\0', 19.0)
-    assert new.interval is None
+    assert new.update(b'\1\0', 19.0) is new.interval is None
 
 
 def test_usual_interval_follows_slowly_and_forgets_a_single_long_one() -> None:
@@ -96,9 +95,9 @@ def test_failure_outweighs_age_and_ends_with_the_next_good_read() -> None:
     assert failing.freshness(0.0) is Freshness.FAILED
     failing.update(b'\1\0', 1.0)
     assert (failing.freshness(1.0), failing.error) == (Freshness.FRESH, None)
-    failing.fail('again')
+    assert [failing.fail('again') for _ in range(2)] == [True, False]
     assert failing.freshness(1.0) is Freshness.FAILED
-    assert (failing.failures, failing.error, failing.age(1.5)) == (2, 'again', 0.5)
+    assert (failing.failures, failing.error, failing.age(1.5)) == (3, 'again', 0.5)
 
 
 def test_only_changes_are_published() -> None:
@@ -131,12 +130,12 @@ def test_bits_that_are_not_ours_are_not_a_change_of_value() -> None:
 
 
 def test_difference_within_the_deadband_is_no_change() -> None:
-    row = one(Command='Read', Length='2', Publish='Change', Deadband='0.3', Scale='0.1')
+    row = one(Command='Read', Length='2', Publish='Change', Deadband='0.3', Scale='-0.1')
     level = ReadPoint(row, 0.1, 0.6)
-    assert level.update(b'\x0a\0\x14\0', 0.0) == array('f', [1.0, 2.0])
+    assert level.update(b'\x0a\0\x14\0', 0.0) == array('f', [-1.0, -2.0])
     for step, words in enumerate((b'\x0d\0\x14\0', b'\x07\0\x11\0', b'\x0c\0\x17\0')):
         assert level.update(words, 1.0 + step) is None  # creeping is measured from the last one
-    assert level.update(b'\x0a\0\x18\0', 4.0) == array('f', [1.0, 2.4])
+    assert level.update(b'\x0a\0\x18\0', 4.0) == array('f', [-1.0, -2.4])
     assert level.update(b'\x0d\0\x15\0', 5.0) is None
 
 

@@ -167,8 +167,8 @@ def test_forecast_is_what_comes(periods: dict[int, int]) -> None:
 def test_job_that_is_put_again_is_there_once() -> None:
     job = make_job(10_000)
     queue = make_queue(job)
-    queue.put(job, 3.0)
-    queue.put(job, 2.0)
+    for due in (1.0, 3.0, 2.0):
+        queue.put(job, due)
     assert queue.next_due() == 2.0
     assert [queue.take(9.0), queue.take(9.0)] == [job, None]
     assert job.ticket == 0
