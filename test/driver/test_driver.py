@@ -377,7 +377,7 @@ def test_station_that_is_never_ready_leaves_the_line_to_the_others() -> None:
 
 def test_reply_of_the_wrong_length_or_type_is_not_published() -> None:
     mapping = make_mapping('N7:0', length=2)
-    bench = DriverBench([mapping])
+    bench = DriverBench([mapping, make_mapping('N7:5')])
     answers = [b'', b'\x00', b'\x42\1\0', bytes.fromhex('97 09 42 01 00 02 00 03 00'),
                bytes.fromhex('96 09 94 08 00 00 c0 3f'), b'\xff' * 20]
 
@@ -402,6 +402,7 @@ def test_reply_of_the_wrong_length_or_type_is_not_published() -> None:
     assert bench.driver.tasks.transactions >= len(answers)
     assert bench.listener.reads == []
     assert str(bench.driver.points[mapping].error).startswith('unusable reply: ')
+    assert len(bench.driver.readings.blocks) == 1  # it was no refusal of one of them
 
 
 def test_write_does_not_wait_for_all_packets_of_a_long_read() -> None:

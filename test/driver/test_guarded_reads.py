@@ -107,10 +107,10 @@ def test_rule_13_guarded_rows_come_on_a_line_that_is_slower_than_their_stale_tim
     """A round of reads takes longer: they were withheld for ever, as each answer was too old."""
     guarded = [make_mapping(f'N{file}:0', period=1000, tag=f'guarded{file}',
                             condition=While(('RUN',))) for file in (20, 21)]
-    others = [make_mapping(f'N{file}:0', period=1000, tag=f'other{file}')
-              for file in range(30, 46)]
+    others = [make_mapping(text, period=1000)  # the last is read with a guarded row
+              for text in (*(f'N{file}:0' for file in range(30, 46)), 'N20:1')]
     bench = DriverBench([*others[:8], *guarded, *others[8:]], network=Network(baud=19200))
-    plc = bench.plc(1, 'PLC5', *((f'N{row.address.file}:0', 1) for row in (*guarded, *others)))
+    plc = bench.plc(1, 'PLC5', *((f'N{row.address.file}:0', 2) for row in (*others, *guarded)))
     plc.faults.delay = 0.4
     begun = 30.0
     bench.run(begun + 60.0)
@@ -129,21 +129,23 @@ def test_rule_13_guarded_rows_come_on_a_line_that_is_slower_than_their_stale_tim
 
 def counter_cell(words: int = 1) -> tuple[Cell, Mapping]:
     """Return a cell whose rows depend on a counter, which stands still."""
-    counter = make_mapping('N11:3', tag='alive', period=50)
+    counter, beside = (make_mapping(f'N11:{number}', tag=tag, period=50)
+                       for number, tag in ((3, 'alive'), (4, 'beside')))
     read, other = (make_mapping('N7:0', length=words, period=100, tag=tag,
                                 condition=While(('alive',), 500)) for tag in ('read', 'other'))
-    return Cell(counter, other, read), read
+    return Cell(counter, beside, other, read), read
 
 
-def count(cell: Cell, times: int, gap: float = 0.15) -> None:
+def count(cell: Cell, times: int, gap: float = 0.15, word: str = 'N11:3') -> None:
     """Let the PLC's program count."""
     for number in range(times):
         cell.bench.at(cell.now + number * gap,
-                      lambda number=number: store(cell.plc, 'N11:3', [number + 1]))  # type: ignore
+                      lambda number=number: store(cell.plc, word, [number + 1]))  # type: ignore
 
 
 def test_rule_14_counter_has_to_change_twice_before_anything_is_published() -> None:
     cell, read = counter_cell()
+    count(cell, 20, word='N11:4')
     cell.run(3.0)
     assert cell.bench.listener.times(read) == []
     begun = cell.now
