@@ -236,8 +236,10 @@ def test_more_changes_than_may_wait_never_keep_the_newest_out() -> None:
     line = Line(BIT, NEIGHBOUR)
     line.say(NEIGHBOUR, [1], 'lone')
     for number in range(2 * MAX_WAITING_WRITES + 1):
-        line.say(BIT, [number % 2])
+        line.say(BIT, [number % 2], str(number))
         line.run(0.0001)
+    ended = [int(name) for name, how in line.told() if how == SUPERSEDED]
+    assert len(ended) > MAX_WAITING_WRITES - 99 and ended[0] < 99  # the oldest
     line.say(BIT, [1], 'newest')
     line.run(4.0)
     assert line.value == 1

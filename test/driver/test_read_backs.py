@@ -167,10 +167,11 @@ def test_lost_reply_and_lost_command_are_told_apart(
         which: str, through: Callable[[bytes], bytes], detail: str, held: bytes) -> None:
     bench, mapping = bench_of()
     setattr(bench.far, which, through)
-    bench.write(mapping, [7])
+    bench.driver.write([mapping], [7], bench.clock())
+    bench.write(mapping, [7])  # both wait as one
     bench.at(bench.clock() + 0.75, lambda: setattr(bench.far, which, bytes))
     bench.run(1.5)
-    result, = bench.listener.results
+    result, _ = bench.listener.results
     assert result.outcome is Outcome.UNKNOWN
     assert result.detail.endswith(f'; {detail}')
     assert result.latency < 1.2
@@ -185,6 +186,7 @@ def test_lost_port_leaves_no_write_without_a_result() -> None:
     bench.lose_port()
     assert [result.detail.partition('; ')[2] for result in bench.listener.results] == [
         OVERTAKEN[6:], 'not read back before the line went down']
+    assert bench.listener.results[0].latency >= 1.0
     bench.far.say = bytes
     bench.open(run=5.0)
     assert len(bench.listener.results) == 2
