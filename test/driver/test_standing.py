@@ -89,6 +89,7 @@ def test_unchanged_value_is_written_again_after_its_time_only() -> None:
     assert all(1.0 <= gap < 1.2 for gap in gaps), gaps
     text = str(line.listener.results[-1])
     assert text.startswith('stands in the PLC: conf') and text.endswith('; not written again')
+    assert float(text[29:33]) < 1.1  # since the last of them
 
 
 @pytest.mark.parametrize(('again', 'least', 'most'), [
