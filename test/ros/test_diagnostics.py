@@ -169,7 +169,7 @@ def test_each_event_is_logged_once_with_its_level(
     events.port_changed()
     bench.happened(Message.NTC_NAK_LIMIT_EXCEEDED, (3,), 2)
     bench.happened(Message.ERR_WRONG_MESSAGE, (2, 0, 8), 2)
-    for station, heard in ((1, NOW), (8, None), (9, None)):
+    for station, heard in ((1, 0.0), (8, None), (9, None)):
         bench.happened(Message.ERR_INACTIVE_STATION, (station,), station)
         events.station_changed(Station(station, False, heard))
     for returns in (5, 1):
@@ -177,7 +177,8 @@ def test_each_event_is_logged_once_with_its_level(
     for tns in (8, 9, 10):
         bench.happened(Message.ERR_WRONG_MESSAGE, (1, 0, tns), 1)
     assert bench.tables == 5
-    events.lost('level', 3)
+    for _ in range(10):
+        events.lost('level', 3)
     events.ahead('level', 1.9, ['/a', '/b', '/c', '/d', '/e'])
     events.ahead('lamp', 1.9, [])
     bench.now = NOW + 3.0
@@ -206,8 +207,8 @@ def test_each_event_is_logged_once_with_its_level(
         '[INFO] station 1 answers again',
         f'[INFO] {wrong}1, Dst:0x00, Tns:0x0008 [station 1]{early}',
         f'[ERROR] {wrong}1, Dst:0x00, Tns:0x0009 [station 1]',
-        '[WARN] ~/write/level: 3 messages were lost on their way here and have no result: the '
-        'publisher is too fast for this node, or the network was cut',
+        *['[WARN] ~/write/level: 3 messages were lost on their way here and have no result: the '
+          'publisher is too fast for this node, or the network was cut'] * 10,
         f'[WARN] ~/write/level: the clock of /a or /b or /c or /d {clock}',
         f'[WARN] ~/write/lamp: the clock of a node that is gone {clock}',
         '[ERROR] level (F8:4 at station 2): no file',
@@ -215,14 +216,14 @@ def test_each_event_is_logged_once_with_its_level(
         '[WARN] level (F8:4 at station 2): odd', '[ERROR] level (F8:4 at station 2): odd']
 
 
-@pytest.mark.parametrize('mode, expected', [('Master', None), ('Radio', '2')])
+@pytest.mark.parametrize(('mode', 'shown'), [('Master', [None] * 2), ('Radio', ['2', '3'])])
 def test_counters_of_a_radio_modem_port_without_a_number_are_shown(
-        make_bench: Benches, mode: str, expected: str | None) -> None:
+        make_bench: Benches, mode: str, shown: list[str | None]) -> None:
     bench = make_bench(mode=mode)
-    bench.driver.counters.unsent_messages = bench.driver.counters.refused_for_memory = 2
-    values = {entry.key: entry.value for entry in bench.status('link').values}
-    for name in ('undelivered for lack of handshake', 'refused for lack of memory'):
-        assert values.get(f'messages {name}') == expected
+    bench.driver.counters.unsent_messages, bench.driver.counters.refused_for_memory = 2, 3
+    values = bench.details('link')
+    assert [values.get(f'messages {name}') for name in (
+        'undelivered for lack of handshake', 'refused for lack of memory')] == shown
 
 
 def test_node_on_the_air_with_our_number_is_an_error_for_a_minute(make_bench: Benches) -> None:
@@ -233,7 +234,7 @@ def test_node_on_the_air_with_our_number_is_an_error_for_a_minute(make_bench: Be
     level, text = bench.says('link', NOW + 59)
     assert (level, text.split(':')[:2]) == (
         ERROR, ['ERROR', ' another node on the air has our number, 5'])
-    assert 'our number' not in bench.says('link', NOW + 61)[1]
+    assert 'our number' not in bench.says('link', NOW + 60)[1]
 
 
 def test_names_and_hardware_ids(bench: Bench) -> None:
@@ -323,7 +324,8 @@ def test_link_of_a_node_with_a_duplicate_name(bench: Bench) -> None:
     assert bench.says('link') == (WARN, 'WARN: port open, 0 of 2 stations have answered; '
                                         'another node is called /line_a too')
     bench.set_port(False, 'gone')
-    assert bench.says('link') == (ERROR, 'ERROR: gone; another node is called /line_a too')
+    bench.seen.dds_fault = 'deaf'
+    assert bench.says('link') == (ERROR, 'ERROR: gone; another node is called /line_a too; deaf')
 
 
 def test_link_and_standby_tell_how_often_diagnostics_come(bench: Bench) -> None:
@@ -385,10 +387,9 @@ def test_slave_that_nobody_polls_is_a_warning(make_bench: Benches) -> None:
     bench = make_bench(mode='Slave')
     link = bench.driver.link
     assert isinstance(link, SlaveLink)
-    link.last_poll = NOW - 5.0
-    assert bench.says('link')[0] == OK
-    link.last_poll = NOW - 6.0
-    assert bench.says('link') == (WARN, 'WARN: port open, but not polled for 6 s')
+    link.last_poll = 0.0
+    assert bench.says('link', 5.0)[0] == OK
+    assert bench.says('link', 6.0) == (WARN, 'WARN: port open, but not polled for 6 s')
     bench.set_port(False, 'gone')
     assert bench.says('link') == (ERROR, 'ERROR: gone')
 
@@ -551,8 +552,10 @@ def test_station_that_answers_polls_and_no_command(bench: Bench) -> None:
     assert bench.says('station 1') == told
     assert bench.says('link') == (
         WARN, 'WARN: port open, but 1 of 2 stations answer polls and no command')
-    stations.lost(2, NOW)
+    stations[2].unanswered = 5
     assert bench.says('link')[0] == ERROR  # no station replies to commands
+    stations.lost(2, NOW)
+    assert bench.says('link')[0] == ERROR
     stations.lost(1, NOW)  # it comes and goes
     assert bench.says('station 1', NOW + 9.9) == told
     assert bench.says('station 1', NOW + 10) == (ERROR, 'ERROR: station 1 inactive for 10.0 s')
@@ -686,11 +689,13 @@ def test_rows_that_cannot_keep_their_period_are_named_with_one_that_would_do(
     assert bench.says('mappings', NOW) == (WARN, (
         'WARN: of 5 mappings 5 fresh; Period not kept: faster (Period 50 ms, kept 206 ms), '
         'fast (Period 100 ms, kept 405 ms); the line can keep Period 1000'))
-    read_until(NOW + 45, {'fast': 0.14, 'slow': 1.0, 'free': 1.0, 'faster': 0.06})
-    bench.point('slow').fail('no reply')
+    read_until(NOW + 45, {'fast': 0.14, 'slow': 1.3, 'free': 1.0, 'faster': 0.06})
+    bench.point('asked').fail('no reply')
+    bench.driver.spent[bench.mapping('fast')] = 36.0
     assert bench.says('mappings', NOW + 45) == (ERROR, (
         'ERROR: of 5 mappings 1 failed, 4 fresh; Period not kept: fast (Period 100 ms, kept '
-        '141 ms); the line can keep Period 200'))
+        '141 ms); the line can keep Period 200; messages fill 80% of the line: fast (80%); set '
+        'Write_Again to leave out unchanged values'))
     assert 'Period' not in bench.says('mappings', NOW + 95)[1]  # no row is read any more
 
 
@@ -768,7 +773,8 @@ OUTCOMES: list[tuple[Outcome, dict[str, str]]] = [
 @pytest.mark.parametrize(('outcome', 'expected'), OUTCOMES,
                          ids=[outcome.name for outcome, _ in OUTCOMES])
 def test_every_outcome_is_counted_in_its_place(
-        bench: Bench, outcome: Outcome, expected: dict[str, Any]) -> None:
+        bench: Bench, outcome: Outcome, expected: dict[str, Any],
+        capfd: pytest.CaptureFixture[str]) -> None:
     log = WriteLog(PORT)
     log.add(result(bench, outcome, 'why'), NOW)
     values = log.values(NOW + 1)
@@ -782,6 +788,7 @@ def test_every_outcome_is_counted_in_its_place(
     is_good = outcome in (Outcome.WRITTEN, Outcome.STANDS)
     assert (level, text[0]) == (WARN if is_failure else OK, '01'[is_good])
     bench.written(result(bench, outcome))
+    assert bool(''.join(capfd.readouterr())) == is_failure
     assert bench.results[0].level == (
         OK if is_good else WARN if not is_failure or outcome is Outcome.FALLBACK else ERROR)
 
@@ -921,14 +928,19 @@ def test_station_is_told_by_the_worst_of_its_heartbeats(make_bench: Benches) -> 
 
 def test_heartbeat_that_another_program_writes_is_an_error_with_what_it_wrote(
         make_bench: Benches) -> None:
-    bench = make_bench('alive,Heartbeat,N10:0,1,PLC5,500')
-    beat = bench.driver.interlocks.heartbeats[0]
+    bench = make_bench('alive,Heartbeat,N10:0,1,PLC5,500,', 'other,Heartbeat,N10:1,2,PLC5,500,',
+                       'ruled,Read,B12:0/2,2,PLC5,1000,other', header=f'{HEADER},Confirms')
+    beat, other = bench.driver.interlocks.heartbeats
     beat.confirmed, beat.state = NOW, BeatState.CONFLICT
-    assert bench.says('interlocks')[0] == ERROR
+    other.confirmed, other.state, other.value = NOW, BeatState.COUNTS, 1
+    assert bench.says('interlocks') == (ERROR, (
+        'ERROR: 1 of 2 heartbeats count; alive: heartbeat does not count; other: the PLC does not '
+        'confirm that ROS is in control'))
     bench.events.foreign_value(beat.mapping, 'one strange word', is_conflict=False)
     assert not bench.seen.conflicts
     text = 'N10:0: another program writes this word: 7 was read where 3 was written'
-    bench.events.foreign_value(beat.mapping, text.removeprefix('N10:0: '), is_conflict=True)
+    for row, said in ((other, '5'), (beat, '6'), (beat, text.removeprefix('N10:0: '))):
+        bench.events.foreign_value(row.mapping, said, is_conflict=True)
     assert bench.details('interlocks')['station 1'] == f'not in control: {text}'
     beat.state, beat.value = BeatState.COUNTS, 1
     assert bench.details('interlocks')['station 1'].startswith('heartbeat counts')

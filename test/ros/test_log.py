@@ -196,8 +196,8 @@ def test_rows_of_a_file_that_fail_for_one_reason_are_one_line(
     rows = UnreadableRows(lines)
     mappings: dict[tuple[str, int], Mapping] = {}
     for now, address, station, reason in (
-            (0.0, 'N7:5', 1, 'no'), (0.9, 'N7:2', 1, 'no'), (1.0, 'N7:1', 2, 'no'),
-            (1.1, 'N7:3', 1, 'never'), (1.25, 'N9:3', 1, 'no'), (1.25, 'N7:5', 1, 'no')):
+            (0.0, 'N7:10', 1, 'no'), (0.9, 'N7:2', 1, 'no'), (1.0, 'N7:1', 2, 'no'),
+            (1.1, 'N7:3', 1, 'never'), (1.25, 'N9:3', 1, 'no'), (1.25, 'N7:10', 1, 'no')):
         rows.look(now)
         mapping = mappings.setdefault(
             (address, station), make_mapping(address, station=station, tag=address))
@@ -206,7 +206,7 @@ def test_rows_of_a_file_that_fail_for_one_reason_are_one_line(
     assert logged() == []
     rows.look(2.25)
     assert [text for _, text in logged()] == [
-        '2 rows from N7:2 to N7:5 at station 1 (N7:2, N7:5): no', 'N7:1 (N7:1 at station 2): no',
+        '2 rows from N7:2 to N7:10 at station 1 (N7:2, N7:10): no', 'N7:1 (N7:1 at station 2): no',
         'N7:3 (N7:3 at station 1): never', 'N9:3 (N9:3 at station 1): no']
     for tick in range(101):  # they never pause
         rows.add(10 + tick / 10, make_mapping('N7:0', tag='a'), f'{tick}')
@@ -219,5 +219,5 @@ def test_rows_of_a_file_that_fail_for_one_reason_are_one_line(
     clock.now += 60.0
     rows.tell()
     clock.now += 60.0
-    lines.error('N7:5', 'last')
-    assert logged()[-1] == ('ERROR', 'last (9990 more about N7:5 were not logged)')
+    lines.error('N7:10', 'last')
+    assert logged()[-1] == ('ERROR', 'last (9990 more about N7:10 were not logged)')
