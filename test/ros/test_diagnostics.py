@@ -533,6 +533,7 @@ def test_station_that_is_silent(bench: Bench) -> None:
     bench.driver.stations.heard(2, NOW - 20)
     bench.driver.stations.lost(2, NOW - 12.3)
     bench.happened(Message.NTC_ENQ_LIMIT_EXCEEDED, (3,), 2, NOW - 12.3)
+    bench.happened(Message.NTC_REPLY_MSG_RCVD, (1,), 2, NOW - 12.3)  # this is routine
     bench.happened(Message.ERR_INACTIVE_STATION, (2,), 2, NOW - 12.3)
     assert bench.says('station 2') == (ERROR, 'ERROR: station 2 inactive for 12.3 s')
     values = bench.details('station 2')
@@ -589,21 +590,17 @@ def test_station_that_does_not_reply_in_time(bench: Bench, counter: str, is_hear
         WARN, 'WARN: station 1 takes commands, but does not reply in time')
 
 
-def test_plc_that_its_gateway_does_not_reach(bench: Bench) -> None:
+def test_station_that_its_gateway_does_not_reach_is_not_called_silent(bench: Bench) -> None:
     bench.driver.stations[1].local_status = 0x02  # and has not been heard yet
     assert bench.says('station 1') == (WARN, (
         'WARN: commands do not get to station 1: '
         'STS 02: destination does not acknowledge, delivery not guaranteed'))
-
-
-def test_station_that_its_gateway_does_not_reach_is_not_called_silent(bench: Bench) -> None:
     for number in (1, 2):
         bench.driver.stations.heard(number, NOW)
-    bench.driver.stations[2].local_status = 0x02
-    bench.driver.stations[2].overdue = 2  # late refusals count so
+    bench.driver.stations[1].overdue = 2  # late refusals count so
     assert bench.says('link') == (
         WARN, 'WARN: port open, 1 of 2 stations are not reached by their gateway')
-    bench.driver.stations[1].local_status = 0x02
+    bench.driver.stations[2].local_status = 0x02
     assert bench.says('link')[0] == ERROR
 
 
@@ -621,12 +618,6 @@ def test_refused_command_of_a_plc_is_told_for_a_minute(bench: Bench) -> None:
         WARN, f'WARN: port open, but the bridge has refused a command of {text}')
     assert bench.says('link', NOW + 62.1)[0] == OK
     assert bench.details('link', NOW + 62.1)[f'refused: {text}'] == '3 times'
-
-
-def test_routine_is_no_event_of_a_station(bench: Bench) -> None:
-    bench.happened(Message.NTC_NAK_LIMIT_EXCEEDED, (3,), 1, NOW)
-    bench.happened(Message.NTC_REPLY_MSG_RCVD, (1,), 1, NOW)
-    assert bench.details('station 1')['last event'].startswith('2519 NTC_NAK_LIMIT_EXCEEDED: ')
 
 
 # mappings
