@@ -72,8 +72,9 @@ def test_single_value_has_all_that_is_known_of_it() -> None:
 def test_each_value_of_an_array_has_a_key(
         address: str, length: int, kind: str, values: array | str, keys: list[str]) -> None:
     row = make_mapping(address, length=length, kind=kind)
-    lamp = make_mapping('B3:1/0', tag='lamp', topic='lamp')
-    found = [key for key in details(status_of(row, values, lamp)) if key.startswith('value')]
+    others = (make_mapping('B3:1/0', tag='lamp'), make_mapping('N7:11', length=2, tag='pair'),
+              make_mapping('N7:2', station=2, tag='there'))
+    found = [key for key in details(status_of(row, values, *others)) if key.startswith('value')]
     assert found == keys
 
 
@@ -83,6 +84,7 @@ def test_each_value_of_an_array_has_a_key(
     (array('h', [7]), 9.0, None, STALE, 'STALE: 7, 9.0 s ago'),
     (array('h', [7]), 9.0, 'no reply', ERROR, 'ERROR: no reply; 7, 9.0 s ago'),
     (array('h', [7]), 9.0, 'not in RUN', ERROR, 'ERROR: not in RUN; 7, 9.0 s ago'),
+    (None, 0.0, 'no reply', ERROR, 'ERROR: no reply'),
     (None, 0.0, None, STALE, 'STALE: waiting for the first read')])
 def test_value_that_is_not_fresh_says_so(
         values: array | None, age: float, error: str | None, level: bytes, message: str) -> None:
