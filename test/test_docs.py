@@ -42,6 +42,8 @@ from support.cases import for_all
 from support.ros import HAS_FAST_DDS_3, PROFILES_VARIABLE
 from support.simulator_process import STATUSES
 
+from tools import reference
+
 NAMESPACE = 'http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles'
 ROOT = documents.ROOT
 COMMANDS = tuple(MAINS)
@@ -147,6 +149,12 @@ def test_defaults_that_pages_quote_are_right(name: str) -> None:
             documents.text(name).split())):
         if parameter in defaults:
             assert str(defaults[parameter]).lower().removesuffix('.0') == said, parameter
+
+
+@for_all(('file', 'name'), [part for part in reference.PARTS if part[1] != 'drawing'])
+def test_tables_of_the_pages_are_those_of_the_code(file: str, name: str) -> None:
+    text = (reference.ROOT / file).read_text(encoding='utf-8')
+    assert reference.filled(text, name, reference.PARTS[file, name]()) == text, 'make docs'
 
 
 def test_every_status_is_in_the_reference() -> None:
