@@ -1016,15 +1016,15 @@ def test_rows_whose_messages_fill_the_line_are_named_the_fullest_first() -> None
 
 
 def test_gateway_of_a_station_is_named(make_bench: Benches) -> None:
-    bench = make_bench('speed,Read,N7:0,1,PLC5,1000,8', 'level,Read,N7:0,2,PLC5,1000,',
+    bench = make_bench('speed,Read,N7:0,1,PLC5,1000,0', 'level,Read,N7:0,2,PLC5,1000,',
                        'all,Write,N7:0,255,PLC5,,',
                        header='Tag,Command,Address,Station,PLC_Type,Period,Via')
-    assert bench.details('station 1')['gateway'] == '8'
+    assert bench.details('station 1')['gateway'] == '0'
     assert 'gateway' not in bench.details('station 2')
-    assert stations_of(bench.driver.mappings) == {1, 2, 8}
+    assert stations_of(bench.driver.mappings) == {0, 1, 2}
     said = []
-    for number in (1, 8):
+    for number in (1, 0):
         bench.driver.stations.lost(number, NOW)
         said.append(bench.says('station 1', NOW + 2)[1])
     text = 'ERROR: station 1 inactive for 2.0 s'
-    assert said == [f'{text}; its gateway, station 8, answers', text]
+    assert said == [f'{text}; its gateway, station 0, answers', text]

@@ -130,10 +130,11 @@ def test_what_is_left_out_changes_nothing_else(tmp_path: Path) -> None:
     kept = "  a:\n    ros__parameters: {day: 2001-99-99, no-1: 010, text: '5', list: [1, 2]}\n"
     path = yaml_file(tmp_path, (
         f'hall/press-plc:\n  ros__parameters: {{}}\nhall:\n  b-1: {{c: {{}}}}\n{kept}'))
-    given = ['--params-file', '/nowhere', '--params-file', path, '-p', '--params-file']
-    with usable_files(given, leaves_out=True) as (*first, usable, option, value):
-        assert [*first, path, option, value] == given
-        assert Path(usable).read_text('utf-8') == f'hall:\n{kept}'
+    given = ['--params-file', '/nowhere', *['--params-file', path] * 2, '-p', '--params-file']
+    with usable_files(given, leaves_out=True) as (*first, usable, name, again, option, value):
+        assert [*first, path, name, path, option, value] == given
+        for file in usable, again:
+            assert Path(file).read_text('utf-8') == f'hall:\n{kept}'
 
 
 def test_temporary_folder_is_asked_for_only_where_a_name_is_left_out(

@@ -200,7 +200,7 @@ def test_port_is_the_parameter_or_else_com_port(
     ('stale_after', 5, 5.0), ('diagnostics_period', 60, 60.0), ('diagnostics_period', 0.1, 0.1),
     ('default_period', 0, 0), ('default_period', 86_400_000, 86_400_000),
     ('read_only', True, True), ('write_timeout', 0.05, 0.05), ('poll_list', [1, 2], '1,2'),
-    ('poll_list', 3, '3')])
+    ('poll_list', 3, '3'), ('priority_poll_list', [1, 2], '1,2'), ('trace_file', 1.5, '1.5')])
 def test_own_parameter_has_the_value_and_type_that_was_given(
         configured: Configured, name: str, value: Any, expected: Any) -> None:
     found = getattr(configured(**{name: value}).parameters, name)
@@ -221,7 +221,7 @@ def test_parameters_tell_how_stations_are_polled(
 
 def test_poll_list_without_standard_polling_is_told(configured: Configured) -> None:
     given = {'poll_list': '1-2', 'priority_poll_list': '1', 'poll_group_size': 1,
-             'poll_multiple': True}
+             'poll_multiple': True, 'send_in_sequence': True}
     assert configured(**given).idle == [*given]
     assert configured(**given | {'net.polling': 'Standard'}).idle == []
 
@@ -237,7 +237,7 @@ def test_gateway_is_polled_for_the_stations_behind_it(
         monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr('random.randrange', lambda stop: stop - 1)
     rows = [f'{tag},Read,N7:0,{station},PLC5,{via}'  # c is read often enough
-            for tag, station, via in (('a', 1, '8,,'), ('b', 9, '8,,'), ('c', 2, ',,'),
+            for tag, station, via in (('a', 1, '0,,'), ('b', 9, '0,,'), ('c', 2, ',,'),
                                       ('d', 2, ',c,1000'))]
     files['map_file'] = str(write_csv(
         tmp_path / 'via.csv', 'Tag,Command,Address,Station,PLC_Type,Via,While,While_Timeout',
@@ -245,11 +245,11 @@ def test_gateway_is_polled_for_the_stations_behind_it(
     assert configured().map_problems == []
     settings = configured().driver_settings()
     assert (settings.polling, settings.default_period, settings.first_tns) == (
-        PollingSettings((2, 8)), 0.1, 0xFFFF)
-    assert problems_of(make_node(files | {'poll_list': '8,9'})) == [
-        'parameter poll_list: station 9 is behind gateway 8, which is polled in its place']
+        PollingSettings((0, 2)), 0.1, 0xFFFF)
+    assert problems_of(make_node(files | {'poll_list': '0,9'})) == [
+        'parameter poll_list: station 9 is behind gateway 0, which is polled in its place']
     assert problems_of(make_node(files | {'priority_poll_list': '1'})) == [
-        'parameter priority_poll_list: station 1 is behind gateway 8, which is polled in its '
+        'parameter priority_poll_list: station 1 is behind gateway 0, which is polled in its '
         'place']
 
 
@@ -421,13 +421,13 @@ def test_port_in_the_home_directory_and_a_substitution_of_launch_files(
         make_node: Nodes, files: Files, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv('HOME', '/home/me')
     assert configure(make_node({**files, 'port': '~/plc'})).port == '/home/me/plc'
-    assert problems_of(make_node({**files, 'map_file': '$(find-pkg-share x)/map.csv'})) == [
-        'parameter map_file: $(find-pkg-share x)/map.csv: $(...) is for launch files; write the '
+    assert problems_of(make_node({**files, 'map_file': '/$(find-pkg-share x)/map.csv'})) == [
+        'parameter map_file: /$(find-pkg-share x)/map.csv: $(...) is for launch files; write the '
         'path']
 
 
 def test_parameter_of_another_node_is_none_of_our_business(make_node: Nodes, files: Files) -> None:
-    other = 'qos_overrides./camera/image.publisher.depth'
+    other = 'qos_overrides./camera/parameters/image.publisher.depth'
     assert configure(make_node({**files, 'camera.gain': 3, other: 2})).mappings
 
 

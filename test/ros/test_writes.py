@@ -56,7 +56,7 @@ class Taker:
 
     def __init__(self, *tags: str) -> None:
         self.mappings = [*(make_mapping('N7:0', 'Write', tag=tag) for tag in tags),
-                         make_mapping('N7:9', tag='read')]
+                         make_mapping('N7:9', tag='r'), make_mapping('N7:8', 'Heartbeat', tag='h')]
         self.executor, self.tasks, self.said = self, list[Callable[[], None]](), list[str]()
         self.stamps, self.requests = list[str](), list[str]()
         self.callbacks: dict[str, Callable[[Any, Any], None]] = {}
@@ -204,14 +204,14 @@ def test_messages_go_to_the_old_driver_until_the_new_one_has_the_line(
 
 def test_message_that_waits_for_rows_which_a_reload_takes_away_or_that_fails_ends_nothing(
         node: Taker, topics: WriteTopics) -> None:
-    node.publish('a', 1)
-    node.publish('b', 0)
     node.publish('b', 1)
-    node.mappings[0] = make_mapping('N7:9', 'Write', tag='c', fallback=Fallback((7,), 1000))
+    node.publish('a', 0)
+    node.publish('a', 1)
+    node.mappings[1] = make_mapping('N7:9', 'Write', tag='c', fallback=Fallback((7,), 1000))
     topics.give_to(node.open(topics))
     topics.begin()
     node.tasks[0]()
-    assert node.said == ['-a', 'a message on ~/write/b', 'b 1']
+    assert node.said == ['-b', 'a message on ~/write/a', 'a 1']
     for before in 9.0, 0.0:
         topics.host_clock.look(line_time() - before, 0.0)
     node.publish('c', 1)
