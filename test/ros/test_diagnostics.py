@@ -330,7 +330,8 @@ def test_link_of_a_node_with_a_duplicate_name(bench: Bench) -> None:
 
 def test_link_and_standby_tell_how_often_diagnostics_come(bench: Bench) -> None:
     bench.seen.diagnostics_period = 10.0
-    for is_waiting in (False, True):
+    for is_waiting, count in (False, 6), (True, 1):
+        assert len(bench.diagnostics.levels(NOW, is_waiting=is_waiting)) == count
         status = bench.diagnostics.statuses(NOW, is_waiting=is_waiting)[0]
         assert details(status)['diagnostics period'] == '10 s'
 
@@ -406,13 +407,6 @@ def test_last_numbered_error_has_its_age(bench: Bench) -> None:
     assert last_error(NOW + 100) == f'{expected} (100.0 s ago)'  # a notice is no error
 
 
-def test_link_tells_what_the_uart_has_counted(
-        bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert 'framing errors' not in bench.details('link')
-    monkeypatch.setattr(bench.opener, 'errors', lambda: {'framing errors': 3})
-    assert bench.details('link')['framing errors'] == '3'
-
-
 def test_rates_are_those_since_the_last_look(
         make_bench: Benches, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr('abdf1_ros.ros.diagnostics.link.line_time', lambda: NOW - 4.0)
@@ -427,8 +421,10 @@ def test_rates_are_those_since_the_last_look(
     assert (values['port'], values['transactions per second']) == ('open', '15.0')
     assert values['line load'] == '75 %'  # 1440 characters of 10 bits at 9600 baud, in 2 s
     assert values['settings'] == '9600 baud, 8 data bits, parity None, 1 stop bits, CRC'
+    monkeypatch.setattr(bench.opener, 'errors', lambda: {'framing errors': 3})
     values = bench.details('link', NOW + 3)
     assert (values['transactions per second'], values['line load']) == ('0.0', '0 %')
+    assert values['framing errors'] == '3'
 
 
 def test_load_of_the_line_is_told_by_topic_the_largest_first(tmp_path: Path) -> None:
@@ -522,11 +518,9 @@ def test_station_before_its_first_answer(bench: Bench) -> None:
 def test_station_that_answers_is_ok_and_tells_its_last_answer(bench: Bench) -> None:
     bench.driver.stations.heard(1, NOW - 0.3)
     station = bench.driver.stations[1]
-    station.last_tns, station.replies, station.remote_errors = 0xAB, 4, 1
+    station.last_tns, station.replies, station.failures, station.remote_errors = 0, 4, 2, 1
     assert bench.says('station 1') == (OK, 'OK: station 1 active')
-    values = bench.details('station 1')
-    assert values['last answer'] == '0.3 s ago'
-    assert (values['last TNS'], values['replies'], values['error replies']) == ('0x00AB', '4', '1')
+    assert [*bench.details('station 1').values()][1:6] == ['0.3 s ago', '0x0000', '4', '2', '1']
 
 
 def test_station_that_is_silent(bench: Bench) -> None:
@@ -690,25 +684,18 @@ def test_rows_that_cannot_keep_their_period_are_named_with_one_that_would_do(
     assert 'Period' not in bench.says('mappings', NOW + 95)[1]  # no row is read any more
 
 
-def test_failed_mapping_is_named_with_the_reason(bench: Bench) -> None:
-    bench.point('speed').update(b'\x01\x00', NOW)
-    bench.point('level').update(bytes(4), NOW)
-    bench.point('level').fail('STS 10: illegal command or format')
-    assert bench.says('mappings', NOW + 0.5) == (ERROR, 'ERROR: of 2 mappings 1 failed, 1 fresh')
-    values = bench.details('mappings', NOW + 0.5)
-    assert values['level'] == \
-        'failed: F8:4 at station 2, last read 0.5 s ago; STS 10: illegal command or format'
-    assert 'speed' not in values
-
-
-def test_withheld_mapping_tells_why_since_when_and_how_often(bench: Bench) -> None:
-    speed = bench.point('speed')
+def test_failed_and_withheld_mappings_tell_why_since_when_and_how_often(bench: Bench) -> None:
+    speed, level = bench.point('speed'), bench.point('level')
+    level.update(bytes(4), NOW)
+    level.fail('STS 10: illegal command or format')
     speed.update(b'\x01\x00', NOW)
     speed.withhold('not in RUN', NOW)
     speed.update(b'\x01\x00', NOW + 1)
     speed.withhold('not in RUN', NOW + 2)
-    assert bench.says('mappings', NOW + 2)[0] == ERROR
-    assert bench.details('mappings', NOW + 5)['speed'] == (
+    assert bench.says('mappings', NOW + 2)[1] == 'ERROR: of 2 mappings 1 failed, 1 withheld'
+    values = bench.details('mappings', NOW + 5)
+    assert (values['level'], values['speed']) == (
+        'failed: F8:4 at station 2, last read 5.0 s ago; STS 10: illegal command or format',
         'withheld: N7:0 at station 1, last read 4.0 s ago; not in RUN, for 3.0 s; '
         'times withheld: 2')
 
@@ -1019,6 +1006,8 @@ def test_gateway_of_a_station_is_named(make_bench: Benches) -> None:
     bench = make_bench('speed,Read,N7:0,1,PLC5,1000,0', 'level,Read,N7:0,2,PLC5,1000,',
                        'all,Write,N7:0,255,PLC5,,',
                        header='Tag,Command,Address,Station,PLC_Type,Period,Via')
+    bench.happened(Message.NTC_ENQ_LIMIT_EXCEEDED, (3,), 1)
+    assert bench.details('station 1')['last event'].startswith('2520 NTC_ENQ_LIMIT_EXCEEDED')
     assert bench.details('station 1')['gateway'] == '0'
     assert 'gateway' not in bench.details('station 2')
     assert stations_of(bench.driver.mappings) == {0, 1, 2}

@@ -14,6 +14,7 @@
 
 """A bridge in Mode Listen beside a master that was written here, byte by byte."""
 
+from dataclasses import replace
 import os
 from pathlib import Path
 import select
@@ -115,6 +116,9 @@ def listen(ros: Observer, tmp_path: Path, ptys: list[Pty], *, is_full: bool) -> 
                          'none of 1 stations is heard' in status.message)
         answer = ros.call(SetBool, '/abdf1/polling', SetBool.Request(data=False))
         assert answer.success
+        before, now = {*bridge.publishers}, bridge.session.configuration
+        bridge.hand_over(replace(now, network=replace(now.network, listen_port='/.')))
+        assert len(before - {*bridge.publishers}) == 2  # perhaps there are other PLCs
     finally:
         master.is_over.set()
         ros.end(bridge)

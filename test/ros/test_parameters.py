@@ -525,9 +525,8 @@ def test_restart_has_the_scope_of_the_first_start() -> None:
 
 
 def test_every_parameter_has_a_type_and_a_description() -> None:
-    assert parameter_types()['read_only'] is bool
-    assert parameter_types()['stale_after'] is float
-    assert parameter_types()['default_period'] is int
+    assert [parameter_types()[name] for name in (
+        'read_only', 'stale_after', 'default_period')] == [bool, float, int]
     assert [descriptions()[name] for name in ('read_only', 'net_file')] == [
         'refuse every write; default: False', 'path of the net CSV, needed']
     assert descriptions().keys() == parameter_types().keys()

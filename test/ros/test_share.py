@@ -21,6 +21,8 @@ from unittest.mock import Mock
 
 from abdf1_ros.cli.sniff import main as sniff
 from abdf1_ros.client import Client
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.driver.guests import Guest
 from abdf1_ros.errors import RemoteError
 from abdf1_ros.ros.bridge.guests import GuestPlaces
 from abdf1_ros.settings.network import Network
@@ -28,6 +30,7 @@ from abdf1_ros.share.guest_line import GuestLine
 import pytest
 from std_msgs.msg import Float32MultiArray
 from support.device_server import OWN_HOST
+from support.mappings import make_mapping
 from support.ros import Observer, OK, Process, until_status, WARN
 from support.simulator_process import make_files, OFTEN
 
@@ -54,17 +57,14 @@ def test_hmi_reads_and_writes_through_the_node(
                           'logical write F8:4 = 30.5, words of setpoint')
             until_status(diagnostics, 'guests', WARN,
                          lambda status: '1 write to words of this bridge' in status.message)
-        with Client(str(place), plc_type='PLC5', station=1, timeout=3.0, cmd_timeout=3.0) as hmi:
-            hmi.write('A10:0', [1, 2, 3])
-        node.wait_for('[WARN] ', 'typed write A10:0 = 0001 0002 0003, words of label')
         node.end()
     assert not place.is_symlink()
     assert sniff([str(tmp_path / 'line.cap')]) == 0
     lines = capsys.readouterr().out.splitlines()
     guests = [line for line in lines if f'| guest pty:{place} |' in line
               and not line.endswith(('RETRANSMISSION', 'DUPLICATE'))]
-    # Five commands of it, and their replies.
-    assert len(guests) == 10
+    # Four commands of it, and their replies.
+    assert len(guests) == 8
     assert sum('write F8:4 = 30.5' in line for line in guests) == 1
     assert len([line for line in lines if ' command ' in line]) > 10
 
@@ -99,7 +99,13 @@ def test_what_is_not_allowed_and_who_is_turned_away_is_told_once(tmp_path: Path)
 def test_internal_error_in_the_line_of_a_guest_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(GuestLine, 'open_port', Mock(side_effect=KeyError('a bug')))
     line, notes = Mock(network=Network(share='tcp:4501')), Mock()
-    places = GuestPlaces(line, Mock(), Mock(), notes, Mock())
+    rows = [make_mapping('N7:9', 'Heartbeat', tag='alive'), make_mapping('N7:0'),
+            *(make_mapping('N7:9', 'Write', tag=tag) for tag in 'ab')]
+    places = GuestPlaces(line, Mock(mappings=rows), Mock(), notes, Mock())
+    guest = Guest('pty:a')
+    places.wrote(guest, Packet(1, 0, 6, 0, 7, b'\x03'), 1, [row.extent for row in rows[1::-1]])
+    assert (guest.collisions, *notes.warning.call_args.args) == (1, 'writes of pty:a', (
+        'guest pty:a has sent to station 1: diagnostic status, words of alive, a, b'))
     for _ in range(2):
         places.start()
     places.lines[0].link.join()

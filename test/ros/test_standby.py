@@ -197,7 +197,7 @@ def test_line_of_a_device_server_is_ours_when_any_station_has_answered_since_it_
         monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr('abdf1_ros.ros.bridge.session.line_time', lambda: 5.0)
     events, session = Mock(), object.__new__(BridgeSession)
-    around = Mock(active_words=None, **{'link.is_released': False})
+    around = Mock(active_words=None)
     stations = MagicMock(**{'words.return_value': [6], '__iter__.side_effect': lambda: iter(
         [SimpleNamespace(last_heard=when) for when in heard])})
     # a station comes while the first table is published, maybe after that of the other thread
@@ -206,19 +206,20 @@ def test_line_of_a_device_server_is_ours_when_any_station_has_answered_since_it_
     vars(session).update(_surroundings=around, _port_text='', events=events, reads=Mock(latest={}),
                          driver=Mock(stations=stations), configuration=Mock(
                              port=port, **{'parameters.standby': has_line}))
-    for is_open in (True, False, True):
+    for is_open, is_released in (True, False), (False, False), (True, False), (False, True):
+        around.link.is_released = is_released
         around.link.state = PortState(is_open, str(is_open))
         for _ in range(2):
             session.port_changed(around.link.state)
         assert session.has_line is (is_open and has_line)
         session.reads.latest['speed'] = [1]
     tables = around.active_stations.publish.call_args_list
-    assert [call.args[0].data[0] for call in tables] == [6, 7, 0, 7]  # none without a port
-    assert around.active_words == [7]
-    assert events.port_changed.call_count == 3  # late replies are no errors
+    assert [call.args[0].data[0] for call in tables] == [6, 7, 0, 7, 0]  # none without a port
+    assert events.port_changed.call_count == 4  # late replies are no errors
     assert [*map(str, events.notes.mock_calls)] == [
         f"call.{level}('the port', '{port}: {is_open}')"
-        for level, is_open in (('info', True), ('error', False), ('info', True))]
+        for level, is_open in (
+            ('info', True), ('error', False), ('info', True), ('info', False))]
     session.begin_end()
     assert around.link.wake.called  # the last commands do not wait for the next poll
     around.is_offered, around.results.waiting = False, ['fallback']

@@ -53,7 +53,7 @@ def with_mode(mode: Mode | None, text: str, *faults: str) -> Identity:
      'in test mode (REM TEST, single scan)'),
     (with_mode(Mode.PROGRAM, 'PROG', 'major error 0x0020, processor halted'),
      'major error 0x0020, processor halted (PROG)'),
-    (with_mode(Mode.RUN, 'RUN', 'bad RAM'), 'bad RAM (RUN)')])
+    (with_mode(Mode.RUN, 'RUN', 'bad RAM', 'bad ROM'), 'bad RAM, bad ROM (RUN)')])
 def test_what_keeps_a_processor_from_its_work(identity: Identity | None, text: str | None) -> None:
     assert processor_fault(identity) == text
 

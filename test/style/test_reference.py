@@ -25,12 +25,6 @@ from tools import reference
 from tools.explanations import COUNTERS, MESSAGES, OUTCOMES
 
 
-def test_drawing_is_up_to_date() -> None:  # test_docs.py has the other parts
-    text = (reference.ROOT / 'docs' / 'architecture.md').read_text(encoding='utf-8')
-    made = reference.PARTS['docs/architecture.md', 'drawing']()
-    assert reference.filled(text, 'drawing', made) == text, 'make docs'
-
-
 def test_every_message_has_cause_and_cure() -> None:
     assert list(MESSAGES) == list(Message)
     assert [entry for entry in MESSAGES.values() if not entry.cause or not entry.cure] == []

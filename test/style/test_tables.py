@@ -107,6 +107,7 @@ def test_no_room_leads_back_to_itself(found: dict[Room, set[Room]]) -> None:
 
 def test_drawing_names_every_room_once() -> None:
     text = drawing.mermaid()
+    assert text in (Path(__file__).parents[2] / 'docs' / 'architecture.md').read_text('utf-8')
     labels = re.findall(r'\["(.*?)"\]', text)
     assert [label.replace('<br>', ', ') for label in labels] == [room.name for room in ROOMS]
     assert re.search(r'r\d+ --> r\d+', text)
