@@ -20,7 +20,7 @@ from collections.abc import Iterator
 import re
 
 _BIT_AFTER_DOT = re.compile(
-    r'(?<![A-Z])(?P<word>(?:B|N|S|A|D)\d*[:;]\d+)\.(?P<bit>\d{1,2})(?![\d./])', re.ASCII)
+    r'(?<![A-Z])(?P<word>(?:B|N|S|A|D)\d*[:;]\d+)\.(?P<bit>\d{1,2})(?!\d)', re.ASCII)
 # Letters O among digits.
 _LETTERS_O = re.compile(r'(?<=[:;./0-9-])O+(?![A-Z])', re.ASCII)
 

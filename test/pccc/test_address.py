@@ -89,7 +89,7 @@ def test_what_is_no_address(family: PlcType, text: str) -> None:
     (SLC, 'I:30', 'I:31'), (SLC, 'O:30', 'O:31'),
     (SLC, 'I:0.255', 'I:0.256'), (PLC5, 'B3/31999', 'B3/32000'), (SLC, 'B3/4095', 'B3/4096'),
     (SLC, 'I1:0', 'I2:0'), (PLC5, 'O0:0', 'O1:0'), (PLC5, 'N3:0', 'N2:0'),
-    (SLC, 'T255:255.ACC', 'T256:0.ACC'),
+    (SLC, 'T255:255.ACC', 'T256:0.ACC'), (SLC, 'HSC0:0', 'HSC3:0'),
     *((family, last, beyond) for family in BOTH for last, beyond in (
         ('N7:0/15', 'N7:0/16'), ('B3:0/15', 'B3:0/16'), ('B3:0', 'B0:0'), ('S2:0', 'S3:0'),
         ('T4:0.2', 'T4:0.3'), ('T4:0', 'T1:0'), ('N7/0', 'N7/32000'), ('N7:0', 'N1234567:0'))),
@@ -124,7 +124,7 @@ def test_str_is_the_plain_form(text: str, family: PlcType, shown: str) -> None:
 @for_all(('text', 'family', 'advice'), [
     ('S/26', SLC, 'the word of the status file comes first; write S:1/10'),
     (' s2/15 ', PLC5, 'the word of the status file comes first; write S:0/15'),
-    ('N11[1]', SLC, 'an element stands after ":"; write N11:1'),
+    ('N11[12]', SLC, 'an element stands after ":"; write N11:12'),
     ('I/3', SLC, 'write the word too, as in I:1/3'),
     ('O/5', PLC5, 'write the word too, as in O:017/12'),
     ('M0:1.0', SLC, 'M files (words of an I/O module, which COP brings into an N file)')])
@@ -183,7 +183,8 @@ def test_members_of_large_structures(family: PlcType, text: str, word: int, bit:
     ('PD10:0.2/EN', 'EN is not a member'), ('PD10:0.1/EN', 'EN is not a member'),
     ('PD10:0.SP/INI', 'INI is not a member'), ('PD10:0.SPS', 'SPS is not a member'),
     ('BT9:0.ACC', 'ACC is not a member'), ('PD:0', 'give the file number, as in PD9:0'),
-    ('SC:0', 'give the file number')])
+    ('SC:0', 'give the file number'), ('I:019', 'PLC-5 I/O words are octal'),
+    ('I:018', 'PLC-5 I/O words are octal'), ('I:017/9', 'PLC-5 I/O bits are octal, 0 to 17')])
 def test_what_is_no_part_of_a_structure(text: str, reason: str) -> None:
     with pytest.raises(AddressSyntaxError, match=f'^{reason}'):
         parse_address(text, PLC5)
@@ -270,13 +271,15 @@ def test_number_after_a_timer_is_no_bit_unless_it_has_a_name(
                       'I:1.0/3'),
     ('o:001', SLC, 'this is the octal form of a PLC-5; an SLC has slot, word and bit, as in '
                    'O:1.0/3'),
-    ('B3:0.5', SLC, 'a bit stands after "/"; write B3:0/5'),
+    *((f'{file}:0.5', SLC, f'a bit stands after "/"; write {file}:0/5') for file in (
+        'B3', 'S2', 'A9', 'D9')),
     ('n7:12.03', PLC5, 'a bit stands after "/"; write N7:12/3'),
     ('N7:O', SLC, 'that is the letter O where a digit should be; write N7:0'),
-    ('N1O:1O', PLC5, 'that is the letter O where a digit should be; write N10:10'),
+    ('N1O:1O-2O', PLC5, 'that is the letter O where a digit should be; write N10:10-20'),
     ('B3:0/O', PLC5, 'that is the letter O where a digit should be; write B3:0/0'),
     ('O:OO1/O0', PLC5, 'that is the letter O where a digit should be; write O:001/00'),
     ('T4:O.ACC', SLC, 'that is the letter O where a digit should be; write T4:0.ACC'),
+    ('HSC:0.6', SLC, 'word 6 is the second half of an int32; write the first, 5'),
     ('RTC:0.HR', SLC, 'RTC is a function file whose type code is not known (S:37 to S:42 may '
                       'show the clock, or 0); let the program copy what is needed into an N file'),
     *((f'{name}0:4', SLC, f'{name} is a function file whose type code is not known; let the '

@@ -242,9 +242,9 @@ def test_own_counters_under_the_names_of_the_layout(
 
 
 def test_own_counters_begin_again_behind_16_bits() -> None:
-    counters = Counters(messages_sent=0x1_0003)
+    counters = Counters(messages_sent=0x1_8003)
     served = ServedCounters(counters, COUNTERS)
-    assert decode_counters(served.encode(), COUNTERS)['messages sent'] == '3'
+    assert decode_counters(served.encode(), COUNTERS)['messages sent'] == '32771'
     served.reset()
     counters.messages_sent += 0x1_0001
     assert decode_counters(served.encode(), COUNTERS)['messages sent'] == '1'

@@ -94,7 +94,9 @@ def writable(letters: str, family: PlcType) -> str:
 @for_all(('letters', 'family', 'names'), [
     ('T', PLC5, 'PRE ACC EN TT DN'), ('T', SLC, 'PRE ACC EN TT DN'),
     ('C', SLC, 'PRE ACC CU CD DN OV UN UA'), ('R', PLC5, 'LEN POS EN EU DN EM ER UL IN FD'),
-    ('BT', PLC5, 'CO TO'), ('MG', PLC5, 'TO CO'), ('MG', SLC, ''), ('SC', PLC5, 'PRE'),
+    *((letters, PlcType.PLC3, 'PRE ACC') for letters in 'TC'),
+    ('BT', PLC5, 'CO TO'), ('MG', PLC5, 'TO CO'), ('SC', PLC5, 'PRE'),
+    *((letters, SLC, '') for letters in ('MG', *FUNCTION)),
     ('PD', PLC5, 'CT CL PVT DO SWM CA MO PE SP KP KI KD BIAS MAXS MINS DB SO MAXO MINO UPD '
                  'PVH PVL DVP DVN PVDB DVDB MAXI MINI'),
     ('PD', SLC, 'OL CM AM TM SPS KC TI TD MAXS MINS CVH CVL')])
@@ -208,9 +210,12 @@ def test_files_of_a_micrologix_1000_are_fixed() -> None:
                      7: {'N'}, 8: set(), 9: set(), 10: set()}
 
 
-def test_only_old_processors_may_lack_the_masked_write() -> None:
-    assert {processor.value for processor in Processor if processor.may_lack_masked_write} == {
-        '5/01', '5/02', 'ML1000'}
+def test_what_else_the_processors_differ_in() -> None:
+    assert {processor.value: (processor.may_lack_masked_write, processor.has_clock,
+                              processor.common_interface_file) for processor in Processor} == {
+        '5/01': (True, False, 9), '5/02': (True, False, 9), 'ML1000': (True, False, 7),
+        **dict.fromkeys(('5/03', '5/04', '5/05'), (False, True, 9)),
+        **dict.fromkeys(('ML1100', 'ML1200', 'ML1400', 'ML1500'), (False, False, 9))}
 
 
 def test_packet_has_an_element_at_least_so_that_a_plc_that_lacks_the_file_can_refuse_it() -> None:

@@ -207,13 +207,13 @@ def test_each_bit_of_a_plc5_has_one_remark_or_none() -> None:
     # Gateways (M 10-15..10-19), those with a name last.
     *((bytes.fromhex(data), None, text, address, 55) for data, text, address in (
         ('01 EE 10 10 34 12 00 20 21 00 00 30', '1785-KA series B revision B', 0x2000),
-        ('00 EE 30 2F 34 12 00 20 21 00 30', '1785-KA5 series B revision B', 0x2000),
-        ('00 FE 19 00 00 30 00 20 3F 00', '1785-KE series B revision 31', 0x2000),
+        ('00 EE 30 2F 34 12 00 20 39 00 30', '1785-KA5 series B revision Z', 0x2000),
+        ('00 FE 19 00 00 30 00 20 3A 00', '1785-KE series B revision 26', 0x2000),
         ('00 FE 1B 00 00 00 44 41 03 00' + '20' * 8, '1784-KT or 1784-KT2 series A revision D',
          0x4144))),
-    *((bytes((0, 0xFE, kind, 0, 0)) + name.ljust(9, b'\0') + b'xx' + bytes(8), None,
+    *((bytes((0, 0xFE, kind, 0, 0)) + name.ljust(11, b'\0') + b'xx' + bytes(6), None,
        f'{name.decode()} series A revision 1', 0, size)
-      for kind, name, size in ((0x2C, b'1770-KF3', 20), (0x24, b'1784-KR', 55))),
+      for kind, name, size in ((0x2C, b'1770-KF3', 20), (0x24, b'1784-KR 1.2', 55))),
     (b'\0\x99' + b'1234567', None, 'unknown processor (00 99 31 32 33 34 35 36)', 0, 55)])
 def test_modules_and_where_their_counters_are(
         data: bytes, family: PlcType | None, text: str, address: int, size: int) -> None:

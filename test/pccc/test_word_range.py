@@ -52,7 +52,7 @@ def test_both_forms_name_the_same_place(text: str, levels: str, shown: str, offs
 @for_all(('error', 'text', 'right'), [*((AddressSyntaxError, *case) for case in (
     ('N7', 'as in N7:0'), ('020', 'as in N7:0'), ('N:0', 'give the file number, as in N7:0'),
     ('F8:0', 'F is not a file type of a PLC-3'), ('ST9:0', 'ST is not a file type of a PLC-3'),
-    ('I:018', 'octal, as in I:017'), ('E3.1.2.0.0.18', 'octal, as in I:017'),
+    ('I:018', 'octal, as in I:017'), ('E3.1.2.0.0.19', 'octal, as in I:017'),
     ('N7:0/8', 'PLC-3 bits are octal'),
     ('N7:0.ACC', 'words of N files have no members'), ('T:4', 'say which word, as in T:0.ACC'),
     ('T:4.POS', 'POS is not a member; members of T: CTL, PRE, ACC, EN, TT, DN'),
