@@ -83,7 +83,7 @@ def read(target: AddressedValues) -> Steps[Values]:
         first -= first % size
         count = -(-(address.offset + words - first) // size) * size
     whole = Transfer(address.at_offset(first), count)
-    most = _whole_values(target.dialect.max_read(address.file_type), address, target.codec)
+    most = _whole_values(target.dialect.max_read(address.file_type), target.codec)
     packets = (Transfer(address.at_offset(at), min(most, first + count - at))
                for at in range(first, first + count, most))
     data = yield from read_packets(packets, whole, target.dialect)
@@ -169,9 +169,9 @@ def write_requests(address: Address, codec: Codec, values: Sequence[float] | str
             for first, count in _packets(address, codec, whole.words, dialect)]
 
 
-def _whole_values(most: int, address: Address, codec: Codec) -> int:
+def _whole_values(most: int, codec: Codec) -> int:
     """Return how many words of at most ``most`` a packet has, so that it divides no value."""
-    return most if address.file_type.is_structure else most - most % codec.element_words
+    return most - most % codec.element_words
 
 
 def _packets(address: Address, codec: Codec, words: int,
@@ -180,7 +180,7 @@ def _packets(address: Address, codec: Codec, words: int,
     kind = address.file_type
     # Members of structures are written one by one: words between them may belong to the PLC.
     most = codec.element_words if kind.is_structure else dialect.max_write(kind)
-    step = _whole_values(most, address, codec)
+    step = _whole_values(most, codec)
     return [(first, min(step, words - first)) for first in range(0, words, step)]
 
 

@@ -46,7 +46,7 @@ def command(data: str, cmd: int = 0x0F) -> Packet:
     ('68 00 00 01 00 0F 00 04 02 02 01 00', 'typed read T4:2.ACC, 1 element'),
     ('68 00 00 01 00 07 00 01 0A 01 00', 'typed read I:012, 1 element'),
     ('68 00 00 01 00 07 00 0A 05 01 00', 'typed read file 10:5, 1 element'),
-    ('68 00 00 01 00 0F 00 0C 0A 02 01 00', 'typed read file 12:10.2, 1 element'),
+    ('68 00 00 01 00 0F 00 0C 0A 00 01 00', 'typed read file 12:10.0, 1 element'),
     ('68 0A 00 1E 00 07 00 07 00 0A 00', 'typed read N7:0, 10 elements (from 10 of 30)'),
     ('67 00 00 02 00 07 00 07 05 95 09 42 01 00 FE FF', 'typed write N7:5 = 1 -2'),
     ('67 00 00 01 00 07 00 0A 05 99 09 06 94 08 00 00 AC 41', 'typed write F10:5 = 21.5'),
@@ -87,6 +87,7 @@ def test_data_table_commands(data: str, text: str) -> None:
 @for_all(('cmd', 'data', 'text'), [
     (0x01, '20 00 02', 'unprotected read 020 (ADDR 32), 2 bytes'),
     (0x08, '12 00 FF FF', 'unprotected write 011 (ADDR 18) = FFFF'),
+    (0x08, '12 00', 'unprotected write 011 (ADDR 18) = nothing'),
     (0x00, '12 00 01 02 03', 'protected write 011 (ADDR 18) = 01 02 03'),
     (0x05, '20 00 08 01', 'unprotected bit write 020 (ADDR 32) low byte set 08 reset 01'),
     (0x02, '20 00 08 01 21 00 00 80', 'protected bit write 020 (ADDR 32) low byte set 08 '

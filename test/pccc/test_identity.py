@@ -228,7 +228,8 @@ def test_modules_and_where_their_counters_are(
                   bytes.fromhex('00 EE 10 10 00 00 34 12 42')])
 def test_status_without_its_last_byte_is_of_no_known_processor(data: bytes) -> None:
     assert not str(decode_identity(data)).startswith('unknown')
-    assert str(decode_identity(data[:-1])).startswith('unknown processor (')
+    for size in range(2, len(data)):
+        assert str(decode_identity(data[:size])).startswith('unknown processor (')
 
 
 def test_unknown_processor_is_named_and_not_interpreted() -> None:
@@ -305,7 +306,7 @@ def test_any_bytes_are_an_identity_or_a_format_error(data: bytes) -> None:
 
 
 @for_all(('data', 'layout', 'asked'), [
-    (SLC, FULL_DUPLEX_COUNTERS, ReadCounters(0, 26)),
+    (SLC[:2] + b'\x33' + SLC[3:], FULL_DUPLEX_COUNTERS, ReadCounters(0, 26)),
     (SLC[:2] + b'\x36' + SLC[3:], SLAVE_COUNTERS, ReadCounters(0, 26)),
     (SLC[:3] + b'\x58\0' + b'1761'.ljust(11) + SLC[16:], ML1000_COUNTERS, ReadCounters(0, 22)),
     (PLC5, COUNTERS, ReadCounters(0, 26))])

@@ -75,7 +75,7 @@ def test_address_in_other_forms(encoded: str, address: SystemAddress) -> None:
 @for_all('encoded', [
     '', '07', '07 00', '07 00 07', '07 00 07 FF 2C', '17 00 07 00', '80 07', '07 01 07 00',
     '00', '00 25 4E 00', '00 24 4E 37 3A 30', '00 24 00', '00 24 58 37 3A 30 00',
-    '00 24 4E 37 3A 30 2F 31 00', '00 24 FF 37 3A 30 00'])
+    '00 24 4E 37 3A 30 2F 30 00', '00 24 FF 37 3A 30 00'])
 def test_what_is_no_address(encoded: str) -> None:
     with pytest.raises(FormatError):
         SystemAddress.read(parameters(encoded))

@@ -272,6 +272,6 @@ def test_slc_takes_typed_commands_on_files_that_a_plc5_has_too() -> None:
     assert ask(words, '68 00 00 01 00 06 08 00 01 00') == (0, '96 09 94 08 00 00 7A 44')
     assert ask(words, '67 00 00 01 00 06 07 01 93 09 42 07 00') == (0, '')
     assert words_at(words, 'N7:1') == '07 00'
-    for data, ext_sts in (('06 0A 00', '06'), ('06 01 00', '06'), ('06 63 00', '06'),
+    for data, ext_sts in (('06 0A 00', '06'), ('06 01 01', '06'), ('06 63 00', '06'),
                           ('06 07 02', '07'), ('06 0C 00', '06')):
         assert ask(words, f'68 00 00 01 00 {data} 01 00') == (0xF0, ext_sts)

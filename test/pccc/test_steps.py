@@ -69,8 +69,9 @@ def test_values_across_elements_are_read_in_whole_elements() -> None:
     next(steps)
     with pytest.raises(StopIteration, match=r'\[1284, 1798, 2312\]'):  # words 2 to 4 of the six
         steps.send(reply(bytes(range(12))))
-    assert requests_of(read(AddressedValues.of('T4:1.ACC', SLC)), reply(b'\1\0')) == [
-        'A2 02 04 86 01 02']
+    for text, family, request in (('T4:1.ACC', SLC, 'A2 02 04 86 01 02'),
+                                  ('PD9:1.SP', PlcType.PLC5, '68 00 00 01 00 0E 09 01 02 01 00')):
+        assert requests_of(read(AddressedValues.of(text, family))) == [request]
 
 
 def test_refused_or_odd_reply_is_no_file_and_leaves_an_identity_as_it_was() -> None:
@@ -109,23 +110,27 @@ def test_what_must_not_be_written_is_refused_before_the_first_step() -> None:
     for text, length, fault in (('PD9:0.SP', 25, '25 float32 from PD9:0.SP reach to PD9:0.50'),
                                 ('C5:3/UN', 6, 'bits of a structure end with their word'),
                                 ('N7:0', 0, '0 elements do not fit at N7:0'),
-                                ('ST9:0', 3, 'each string needs its own call, with length 1')):
+                                ('F8:1999', 2, '2 elements do not fit at F8:1999; the last'),
+                                ('ST9:0', 2, 'each string needs its own call, with length 1')):
         with pytest.raises(FormatError, match=f'^{fault}'):
             AddressedValues.of(text, PlcType.PLC5, length)
     with pytest.raises(FormatError, match='2 values'):
         write(AddressedValues.of('N7:0', SLC), [1, 2])
 
 
-@for_all(('text', 'access', 'sts', 'is_told'), [
-    ('I:1.0', None, 0x10, True), ('O:2.0', Access.SLOT, 0x50, True),
-    ('I:1.0', None, 0x60, False), ('I:5', Access.FLAT, 0x10, False), ('N7:0', None, 0x10, False)])
-def test_refused_inputs_and_outputs_by_slot_lead_to_flat(
-        text: str, access: Access | None, sts: int, is_told: bool) -> None:
-    steps = read(AddressedValues.of(text, SLC, access=access))
+@for_all(('text', 'length', 'access', 'sts', 'told'), [
+    ('I:1.0', 1, None, 0x10, 'Access Flat'), ('O:2.0', 1, Access.SLOT, 0x50, 'Access Flat'),
+    ('I:1.0', 1, None, 0x60, ''), ('I:5', 1, Access.FLAT, 0x10, ''),
+    ('N7:0', 41, None, 0x10, ''), ('N7:0', 42, None, 0x50, ''),
+    ('N7:0', 42, None, 0x10, 'too many words at once for this processor')])
+def test_refused_inputs_by_slot_and_long_reads_lead_to_what_may_help(
+        text: str, length: int, access: Access | None, sts: int, told: str) -> None:
+    steps = read(AddressedValues.of(text, SLC, length, access=access))
     next(steps)
     with pytest.raises(RemoteError) as refusal:
         steps.send(reply(sts=sts))
-    assert ('Access Flat' in str(refusal.value)) is is_told
+    assert [text for text in ('Access Flat', 'too many words at once for this processor')
+            if text in str(refusal.value)] == [*filter(None, [told])]
 
 
 def failure(sts: int, data: bytes = b'', meanings: Meanings = USUAL_MEANINGS) -> RemoteError:

@@ -27,7 +27,7 @@ from abdf1_ros.pccc.strings import decode_counted, encode_counted, encode_packed
 from abdf1_ros.pccc.structures import type_fault, write_fault
 from abdf1_ros.pccc.typed_data import TypedData
 from abdf1_ros.pccc.values import Codec, types_of, ValueType, WordOrder
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 import pytest
 from support.cases import for_all
@@ -36,6 +36,7 @@ PLC3, PLC5, SLC = PlcType.PLC3, PlcType.PLC5, PlcType.SLC
 
 
 @settings(max_examples=40)
+@example('a\0b\0')
 @given(st.text(st.characters(max_codepoint=255), max_size=82))
 def test_strings_survive_a_round_trip(text: str) -> None:
     for codec in (Codec(ValueType.STRING, 1), Codec(ValueType.STRING, 41, packed=True)):
@@ -61,7 +62,7 @@ def test_order_of_bytes_and_words(kind: ValueType, order: str, words: str,
     codec = Codec(kind, len(values), word_order=WordOrder(order))
     for decode in codec.decode, codec.decoder():
         assert decode(bytes.fromhex(words)) == array(kind.array_code, values)
-    assert codec.encode(values) == bytes.fromhex(words)
+    assert codec.encode(values) == codec.encode([*map(float, values)]) == bytes.fromhex(words)
 
 
 @pytest.mark.parametrize('word, text', [
@@ -262,6 +263,7 @@ def test_long_array_has_a_two_byte_size() -> None:
     assert values.encode()[:5] == bytes.fromhex('9A 09 2D 01 42')
     assert TypedData.decode(values.encode()) == values
     assert values.count == 150
+    assert TypedData.decode(bytes.fromhex('9C 09 03 00 00 00 42 D2 04')) == TypedData(4, 2, b'\xD2\4')
 
 
 @for_all('encoded', [
