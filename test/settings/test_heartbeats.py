@@ -190,7 +190,7 @@ def test_rule_12_write_and_serve_rows_take_a_fallback(
      'a ReadWrite row has no Fallback: it is for Write and Serve rows'),
     ({'Command': 'Read', 'Fallback': '0'}, 'a Read row has no '
      'Fallback: it is for Write and Serve rows; leave the cell empty'),
-    ({'Address': 'ST9:0', 'Fallback': '0', 'Fallback_After': '500'}, 'a string has no Fallback'),
+    ({'Address': 'ST9:0', 'Fallback_After': '500'}, '(Fallback_After): Item: 1, a string has no'),
     ({'Fallback': '1.5', 'Fallback_After': '500'},
      'Fallback cannot be written: value 1.5 at index 0 is not a valid int16'),
     ({'Station': '255', 'Fallback': '0', 'Fallback_After': '500'},
@@ -227,7 +227,7 @@ def test_rule_13_values_depend_on_run_or_on_a_counter() -> None:
         ({'Publish': 'Change', 'While': 'RUN', 'While_Timeout': ''}, 'needs Publish Always'),
         ({'While': 'RUN'}, 'RUN has no While_Timeout'),
         ({'While': 'doors'}, 'cannot depend on itself'),
-        ({'While': 'nobody'}, 'should be RUN or the tag of one good Read row'),
+        ({'While': 'Doors'}, 'RUN or the tag of one good Read row; "Doors" is neither'),
         ({'While': ''}, 'While_Timeout is for a row with While'),
         ({'Station': '2'}, 'is of station 1; a counter of the same PLC is needed'))),
     *(({}, counter, text) for counter, text in (
@@ -243,8 +243,9 @@ def test_rule_13_what_values_cannot_depend_on(
 
 @pytest.mark.parametrize('timeout', ['', '1000'])
 def test_rule_13_misspelt_tag_is_told_with_the_right_name(timeout: str) -> None:
-    told = faults(row(**DOORS | {'While_Timeout': timeout, 'While': 'Countr'}), row(**COUNTER))
-    assert told[-1].endswith('"Countr" is neither; did you mean counter?')
+    doors = row(**DOORS | {'Command': 'read', 'While_Timeout': timeout, 'While': 'Countr'})
+    told = faults(doors, row(**COUNTER | {'Tag': 'COUNTER'}))
+    assert told[-1].endswith('"Countr" is neither; did you mean COUNTER?')
     assert len(told) == 1 + (not timeout)
 
 
@@ -281,6 +282,7 @@ def test_rule_15_a_row_left_out_takes_along_what_depends_on_it(
 def test_rule_22_bit_confirms_a_heartbeat_of_its_station() -> None:
     rows = load_rows(row(**BIT), row(**BEAT))[0]
     assert [(row.confirms, cell_of(row, 'Confirms')) for row in rows] == [('beat',) * 2, ('',) * 2]
+    assert len(faults(row(**BIT | {'While': 'nobody', 'While_Timeout': '500'}))) == 2
 
 
 @pytest.mark.parametrize('cells', [{'Length': '2'}, {'Address': 'N12:0'}])
@@ -337,7 +339,7 @@ def test_rule_12_fallback_of_bits_of_an_old_slc_is_warned_of() -> None:
 
 
 def test_rule_13_counter_is_not_an_echo_of_our_heartbeat() -> None:
-    found = faults(row(**BEAT), row(**COUNTER | {'Address': 'N10:0'}), row(**DOORS))
+    found = faults(row(**BEAT), row(**COUNTER | {'Address': 'B10:0'}), row(**DOORS))
     assert len(found) == 1
     assert '"counter" reads our own heartbeat, so both sides would wait for each other' in found[0]
 

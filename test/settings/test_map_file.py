@@ -102,7 +102,7 @@ NEEDS = 'Item: 2, write topic "t" needs the message type (int16) and Length (1)'
 @for_all(('first', 'second', 'text'), [
     ({'Tag': 'a.b'}, {'Tag': 'a b', 'Topic': 'other'}, '3:1 (Tag): Item: 2, tag "a b" becomes '
      '"a_b", the name of item 1 (line 2, tag "a.b")'),
-    *(({'Command': command}, {'Tag': 'a', 'Command': command, 'Length': '2'},
+    *(({'Command': command}, {'Tag': 'a', 'Topic': '', 'Command': command, 'Length': '2'},
        f'3:1 (Tag): Item: 2, tag "a" is already the tag{OF_A}')
       for command in ('Read', 'ReadWrite', 'Write')),
     ({'Topic': 'x.y', 'Command': 'Read'}, {'Topic': 'x:y', 'Command': 'Read'},
@@ -119,13 +119,13 @@ NEEDS = 'Item: 2, write topic "t" needs the message type (int16) and Length (1)'
      f'Processor of station 1 is ML1000 here, but 5/01 in the row{OF_A}'),
     (READ, READ | {'Processor': '5/01'}, '3:17 (Processor): Item: 2, Processor of station 1 is '
      f'5/01 here, but 5/03 (an empty cell) in the row{OF_A}'),
-    ({'Via': '10'}, {'Via': '11'}, '3:23 (Via): Item: 2, station 1 has Via 11 here, but Via 10 in '
+    ({'Via': '0'}, {'Via': '11'}, '3:23 (Via): Item: 2, station 1 has Via 11 here, but Via 0 in '
      f'the row{OF_A}'),
-    ({'Via': '10'}, {}, '3:23 (Via): Item: 2, station 1 has no Via here, but Via 10 in the row'),
+    ({'Via': '10', 'Command': 'Write'}, {}, 'station 1 has no Via here, but Via 10 in the row'),
     ({}, {'Via': '10'}, 'station 1 has Via 10 here, but no Via in the row'),
-    ({'Via': '2'}, {'Station': '2', 'Via': '3'}, 'station 2 is itself the gateway in the row'),
-    ({'Via': '2'}, {'Station': '3', 'Via': '1'},
-     'station 1 is itself behind the gateway 2 in the row')])
+    ({'Via': '2'}, {'Station': '2', 'Via': '0'}, 'station 2 is itself the gateway in the row'),
+    ({'Via': '0'}, {'Station': '0', 'Via': '3'}, 'station 0 is itself the gateway in the row'),
+    ({'Via': '0'}, {'Station': '3', 'Via': '1'}, 'station 1 is itself behind the gateway 0 in')])
 def test_rows_that_clash(first: dict[str, str], second: dict[str, str], text: str) -> None:
     found, = faults(row(**first), row(**{'Tag': 'b', 'Topic': 'b'} | second))
     assert text in found
@@ -191,15 +191,16 @@ def test_command_says_whether_a_row_reads_and_writes(text: str, reads: bool, wri
     ({'Station': '255'},
      '4 (Station): 2501 ERR_BAD_STATION: Item: 1, Invalid station number (255) must be less than '
      '255'),
-    ({'Station': 'PLC'}, '4 (Station): 2501 ERR_BAD_STATION: Item: 1, Station = "PLC" should be a '
-     'whole number from 0 to 254'),
+    ({'Station': 'PLC', 'Command': 'Read', 'While': 'run'}, '4 (Station): 2501 ERR_BAD_STATION: '
+     'Item: 1, Station = "PLC" should be a whole number from 0 to 254'),
     ({'PLC_Type': 'S7'},
      '5 (PLC_Type): 2502 ERR_BAD_PLC_TYPE: Item: 1, Invalid or Unsupported PLC Type (S7) should '
      'be one of PLC2, PLC3, PLC5, SLC; a MicroLogix is SLC'),
     ({'Address': 'N7'}, '3 (Address): 2503 ERR_ADDRESS_SYNTAX: Item: 1, Invalid Address Syntax '
      '(N7); an element is missing, as in N7:0'),
-    ({'Address': 'N7:2000'}, '3 (Address): 2504 ERR_ADDRESS_RANGE: Item: 1, Address is out of '
-     'range (N7:2000, len=1); elements of N run from 0 to 1999'),
+    *(({'Address': 'N7:2000', 'Length': cell}, '3 (Address): 2504 ERR_ADDRESS_RANGE: Item: 1, '
+       f'Address is out of range (N7:2000, len={told}); elements of N run from 0 to 1999')
+      for cell, told in (('', 1), ('3', 3))),
     ({'Address': '018', 'PLC_Type': 'PLC2'}, '3 (Address): 2503 ERR_ADDRESS_SYNTAX: Item: 1, '
      'Invalid Address Syntax (018); PLC-2 words and bits are octal, as in 020 or 110/17'),
     ({'Command': 'Poll'}, '2 (Command): Item: 1, Command = "Poll" should be one of '
@@ -281,7 +282,7 @@ def test_command_says_whether_a_row_reads_and_writes(text: str, reads: bool, wri
      'cell empty'),
     ({'PLC_Type': 'SLC', 'Processor': '5/05', 'Address': 'L10:0'}, '3 (Address): Item: 1, 5/05 '
      'has no file L10; ML1100, ML1200, ML1400, ML1500 may have it'),
-    ({'PLC_Type': 'SLC', 'Processor': 'ML1000', 'Address': 'N10:0'}, '3 (Address): Item: 1, '
+    ({'PLC_Type': 'SLC', 'Processor': 'ML1000', 'Address': 'N10:0/3'}, '3 (Address): Item: 1, '
      'ML1000 has no file N10; 5/01, 5/02, 5/03, 5/04, 5/05, ML1100, ML1200, ML1400, ML1500 may '
      'have it')])
 def test_fault_is_told_word_for_word(cells: dict[str, str], expected: str) -> None:
@@ -425,12 +426,14 @@ def test_slc_without_a_processor_is_taken_for_a_5_03() -> None:
 def test_structures_that_we_serve_are_ours_to_write(place: str) -> None:
     assert str(one(Command='Serve', Address=place, Station='5').address).startswith(place[:4])
     assert 'belongs to the processor' in fault(Command='ReadWrite', Address=place)
+    assert cell_of(one(Command='Serve', Station='5', Access='read'), 'Access') == 'Read'
 
 
 def test_row_on_demand_has_no_period_and_promises_nothing() -> None:
     row = one(Period=' On  Demand', Command='Read')
     assert (row.is_on_demand, row.period, row.promise(3.0)) == (True, None, math.inf)
     assert cell_of(row, 'Period') == 'on demand'
+    assert one(Publish='Change', Max_Silence='500').promise(3.0) == 3.5
 
 
 @for_all(('cells', 'expected'), [

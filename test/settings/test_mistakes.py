@@ -189,8 +189,7 @@ NO_TOPIC = '!2:7 (While): Item: 1, no good Write, ReadWrite or Serve row has the
 
 
 @for_all(('requires', 'expected'), [
-    ('"speed,lamp"', '"speed,lamp"; put spaces between topics'),
-    ('speed;lamp', '"speed;lamp"; put spaces between topics'),
+    *((f'"speed{sign}lamp"', f'"speed{sign}lamp"; put spaces between topics') for sign in ',;|'),
     ('level', '"level": the bridge publishes it; name topics whose messages the bridge '
      'gets'),
     ('~/write/lamp', '"~/write/lamp"; did you mean lamp?'),

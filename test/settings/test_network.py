@@ -234,7 +234,7 @@ def test_radio_modem_and_what_it_sends_on(path: Path) -> None:
     assert load(path, 'Mode,Collision_Avoidance', 'Radio,yes').line.avoids_collisions
     assert not load(path, 'Mode,Collision_Avoidance', 'Peer,Yes').line.avoids_collisions
     with pytest.raises(ConfigurationError, match='Store_Forward = "256" should be a station from'):
-        load(path, 'Mode,Store_Forward', 'Radio,"1,256"')
+        load(path, 'Mode,Store_Forward', 'Radio,"1,256,x"')
 
 
 @for_all(('text', 'place'), [
@@ -305,7 +305,8 @@ def test_port_of_the_line_is_no_place(port: str, place: str, tmp_path: Path) -> 
     (Network(mode='Slave'), 'share', 'tcp:4501', 'x: Share needs Mode Master or Peer: '),
     (Network(share='tcp:4501'), 'com_port', 'socket://127.0.0.1:4501', 'Share: Share: "tcp:4501"'),
     (Network(com_port='rfc2217://h:1'), 'mode', 'Listen', 'Com_Port: Com_Port: RFC 2217 '),
-    (Network(mode='Listen'), 'com_port', 'rfc2217://h:1', 'x: Com_Port: RFC 2217 ')])
+    (Network(mode='Listen'), 'com_port', 'rfc2217://h:1', 'x: Com_Port: RFC 2217 '),
+    (Network(mode='Listen', listen_port='2'), 'com_port', '/dev/ttyS1', 'Listen_Port: Listen_P')])
 def test_parameter_has_to_go_with_the_rest_of_the_file(
         base: Network, name: str, text: str, fault: str) -> None:
     with pytest.raises(ConfigurationError, match=f'^{fault}'):
@@ -348,7 +349,7 @@ LISTENING = {'Com_Port': '/dev/ttyS0', 'Mode': 'Listen'}
     ({'Listen_Port': '²'}, 'Listen_Port = "²" should be a number from 1'),
     ({'Listen_Port': '1'}, '2:3 (Listen_Port): Listen_Port: 1 is the device of Com_Port, too'),
     ({'Com_Port': '1', 'Listen_Port': '/dev//ttyS0'}, '/ttyS0 is the device of Com_Port, too'),
-    ({'Com_Port': 'rfc2217://h:1'}, 'RFC 2217 sets the lines of the far port'),
+    ({'Com_Port': 'RFC2217://h:1'}, 'RFC 2217 sets the lines of the far port'),
     ({'Com_Port': 'socket://h:1', 'Listen_Port': '/dev/ttyS1'},
      'both ports must be devices of this machine')])
 def test_ports_that_cannot_be_listened_to(tmp_path: Path, cells: dict[str, str],
