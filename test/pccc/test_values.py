@@ -263,7 +263,7 @@ def test_long_array_has_a_two_byte_size() -> None:
     assert values.encode()[:5] == bytes.fromhex('9A 09 2D 01 42')
     assert TypedData.decode(values.encode()) == values
     assert values.count == 150
-    assert TypedData.decode(bytes.fromhex('9C 09 03 00 00 00 42 D2 04')) == TypedData(4, 2, b'\xD2\4')
+    assert TypedData.decode(b'\x9C\t\3\0\0\0\x42\xD2\4') == TypedData(4, 2, b'\xD2\4')
 
 
 @for_all('encoded', [
