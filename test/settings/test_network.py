@@ -253,13 +253,14 @@ def test_place_is_a_link_a_port_or_a_device(text: str, place: SharePlace) -> Non
 
 @for_all(('text', 'words'), [
     ('hmi', '"hmi" should be pty:/a/name, tcp:PORT'), ('pty:hmi', 'pty:/a/name'),
-    ('tcp:', 'tcp:PORT (for this machine only)'), ('tcp:70000', 'tcp:PORT'), ('tcp:0', 'tcp:PORT'),
+    ('tcp:', 'tcp:PORT (for this machine only)'), ('tcp:70000', 'tcp:PORT'),
+    ('tcp:0', 'tcp:PORT'), ('tcp::4501', 'tcp:PORT'),
     ('tcp:plant.example:4501', 'the address of an interface'),
     *((text, 'only a serial device has baud') for text in (
         'pty:/tmp/a?baud=9600', 'tcp:99?parity=Odd')),
     ('/dev/ttyS1?speed=9600', 'after "?" may come baud=1200|'),
     ('/dev/ttyS1?check=LRC', 'check=BCC|CRC'), ('tcp:99?check=', 'after "?" may come'),
-    ('pty:/tmp/a pty:/tmp/a?check=BCC', 'there twice'),
+    ('pty:/tmp/a pty:/tmp/a?check=BCC', 'there twice; '),
     (' '.join(f'tcp:{port}' for port in range(4000, 4017)), 'the most are 16')])
 def test_fault_says_what_would_be_right(text: str, words: str) -> None:
     with pytest.raises(ConfigurationError) as error:

@@ -111,7 +111,7 @@ def test_value_less_than_half_a_step_outside_is_rounded_into_the_range(value: fl
      'a float32 cannot hold 0 to 9.999e+38, the range of bcd16 with Scale 1e+35, Offset 0'),
     (ValueType.INT32, Scaling(1.0, -1e39),
      'a float32 cannot hold -1e+39 to -1e+39, the range of int32 with Scale 1, Offset -1e+39'),
-    (ValueType.INT16, Scaling(0.001, 2000.0), None), (ValueType.INT32, Scaling(0.001), None),
+    (ValueType.INT16, Scaling(1.0, 8355840.0), None), (ValueType.INT32, Scaling(0.001), None),
     (ValueType.UINT32, Scaling(1.0), None), (ValueType.FLOAT32, Scaling(1000.0, -273.15), None),
     (ValueType.BCD16, Scaling(-0.01, 100.0), None), (ValueType.UINT16, Scaling(1e-40), None)])
 def test_values_that_cannot_be_scaled_and_some_that_can(
