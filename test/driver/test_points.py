@@ -160,7 +160,7 @@ def test_value_that_does_not_change_is_published_again_after_the_longest_silence
 
 
 @for_all(('cells', 'text'), [
-    ({'Deadband': '3'}, 'Deadband is for rows with Publish Change'),
+    ({'Deadband': '0'}, 'Deadband is for rows with Publish Change'),
     ({'Max_Silence': '500'}, 'Max_Silence is for rows with Publish Change'),
     ({'Publish': 'Change', 'Max_Silence': '50'}, 'should be ms from 100 to 3600000'),
     ({'Publish': 'Change', 'Deadband': '-1'}, 'Deadband should be a number from 0 on'),

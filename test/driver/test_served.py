@@ -371,6 +371,8 @@ def test_row_that_the_other_end_may_only_read(plc: str) -> None:
     assert bench.heard() == [(row(second, plc).name, [7])]
     bench.served.store(mine, [6])
     assert bench.read(first, 2) == b'\6\0\7\0'
+    inputs = Bench('PLC5', replace(row('I:000'), is_read_only=True))  # station 1 has file 1
+    assert inputs.ask(0x08, bytes(4)) == (0x50, b'')
 
 
 def test_access_of_a_serve_row() -> None:

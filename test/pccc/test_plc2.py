@@ -144,7 +144,7 @@ def test_common_interface_file_counts_words_or_bytes(flags: str, read: str, writ
 
 
 def test_common_interface_file_gives_an_odd_number_of_bytes() -> None:
-    memory = table(SLC, N9_0='01 02 03 04')
+    memory = table(SLC, N9_0='01 02 03 04', S_0='00 00 00 00')  # without S:2
     assert ask(memory, '00 00 03', 0x01) == (0, '01 02 03')
     assert ask(memory, '00 00 01 02 03', 0x08) == (0x10, '')
     assert ask(memory, '00 00 05', 0x01) == (0x50, '')

@@ -142,6 +142,7 @@ def test_files_of_a_recorded_micrologix_1400() -> None:
     assert {str(entry): entry.elements for entry in files} == {
         'O0': 6, 'I1': 8, 'S2': 66, 'B3': 1, 'T4': 1, 'C5': 1, 'R6': 1, 'N7': 1, 'F8': 1,
         'HSC': 6, 'PTO': 3, 'PWM': 3, 'STI': 1, 'EII': 8}
+    assert [entry.number for entry in files if entry.type.is_function] == [*range(5)]
 
 
 def test_files_of_an_emulated_slc() -> None:

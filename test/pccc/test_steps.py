@@ -69,9 +69,12 @@ def test_values_across_elements_are_read_in_whole_elements() -> None:
     next(steps)
     with pytest.raises(StopIteration, match=r'\[1284, 1798, 2312\]'):  # words 2 to 4 of the six
         steps.send(reply(bytes(range(12))))
-    for text, family, request in (('T4:1.ACC', SLC, 'A2 02 04 86 01 02'),
-                                  ('PD9:1.SP', PlcType.PLC5, '68 00 00 01 00 0E 09 01 02 01 00')):
-        assert requests_of(read(AddressedValues.of(text, family))) == [request]
+    for values, request in (
+            (AddressedValues.of('T4:1.ACC', SLC), 'A2 02 04 86 01 02'),
+            (AddressedValues.of('PD9:1.SP', PlcType.PLC5), '68 00 00 01 00 0E 09 01 02 01 00'),
+            (AddressedValues.of('T4:1.ACC', PlcType.PLC5, 3, access=Access.WORD_RANGE),
+             '01 00 00 06 00 06 04 01 0C')):
+        assert requests_of(read(values)) == [request]
 
 
 def test_refused_or_odd_reply_is_no_file_and_leaves_an_identity_as_it_was() -> None:

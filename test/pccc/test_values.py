@@ -23,8 +23,8 @@ from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.pccc.strings import decode_counted, encode_counted, encode_packed
-from abdf1_ros.pccc.structures import type_fault, write_fault
+from abdf1_ros.pccc.strings import decode_counted, encode_counted, encode_packed, is_string_element
+from abdf1_ros.pccc.structures import named_runs, type_fault, write_fault
 from abdf1_ros.pccc.typed_data import TypedData
 from abdf1_ros.pccc.values import Codec, types_of, ValueType, WordOrder
 from hypothesis import example, given, settings
@@ -196,6 +196,7 @@ def test_string_ends_with_its_length_which_is_at_most_82() -> None:
     with pytest.raises(FormatError, match='^string length 83 is more than 82$'):
         decode_counted(b'\x53\0' + bytes(82))
     assert len(decode_counted(b'\x52\0' + bytes(82))) == 82
+    assert is_string_element(' #st9;0') and not is_string_element('S:9')
 
 
 def at(text: str, family: PlcType = PLC5) -> Address:
@@ -213,6 +214,7 @@ def at(text: str, family: PlcType = PLC5) -> Address:
      '5 uint16 from PD9:0.80 reach to PD9:1.SP, where float32 values are')])
 def test_range_is_of_one_type(text: str, kind: str, length: int, fault: str | None) -> None:
     assert type_fault(at(text), ValueType(kind), length) == fault
+    assert named_runs(at('PD9:1/EN')) == [(at('PD9:1'), 2, 1), (at('PD9:1.SP'), 24, 2)]
 
 
 @for_all(('text', 'family', 'kind', 'length', 'wrong'), [

@@ -366,10 +366,10 @@ def test_ports_that_cannot_be_listened_to(tmp_path: Path, cells: dict[str, str],
 
 def test_second_port_is_for_mode_listen() -> None:
     network = Network(listen_port='2', com_port='/dev/ttyS0')
-    assert network.second_port == ''
+    assert network.ports == ('/dev/ttyS0',)
     assert 'Listen_Port is for Mode Listen; in Mode Master it has no effect' in [
         *network_remarks(network)]
     listening = replace(network, mode='Listen')
-    assert listening.second_port == '/dev/ttyS1'
+    assert listening.ports == ('/dev/ttyS0', '/dev/ttyS1')
     assert not [*network_remarks(listening)]
     assert make_network({'com_port': ('socket://h:1', 'x')}, Network(mode='Listen'))
