@@ -84,8 +84,9 @@ def test_refused_or_odd_reply_is_no_file_and_leaves_an_identity_as_it_was() -> N
         assert len(requests_of(identify(), reply(FAULTED), odd)) == 2  # an old PLC-5
     # A gateway has lost its PLC, no buffer, access denied, owned by another node.
     for refused in (reply(sts=0x02), reply(sts=0x90), reply(b'\x0B', 0xF0), reply(b'\x1A', 0xF0)):
-        with pytest.raises(RemoteError):
-            requests_of(is_there(values.address, values.dialect), refused)
+        for steps in is_there(values.address, values.dialect), identify():
+            with pytest.raises(RemoteError):
+                requests_of(steps, refused)
 
 
 def test_echo_is_what_was_sent() -> None:
@@ -102,7 +103,8 @@ def test_write_stops_at_the_first_failure_and_tells_what_was_written_before() ->
         assert next(steps)[1][:2] == bytes((0xAA, 234))
         assert not done or steps.send(reply())
         with pytest.raises((RemoteError, PortLost)) as caught:
-            steps.throw(error) if error else steps.send(reply(sts=0x60))
+            steps.throw(error) if error else steps.send(reply(b'\x0B', 0xF0))
+        assert error or 'EXT STS 0B: access denied' in str(caught.value)
         assert str(caught.value).endswith(' (after 1 of 3 packets were written)') == done
         assert getattr(caught.value, 'sent', done) == done
 

@@ -161,7 +161,7 @@ LONG = 'x' * 100
         'Known: Tag, Address, Length']),
     (f'Tag,{LONG}x\n', [f'FILE:1:2: unknown column "{LONG}..."; known: Tag, Address, Length']),
     *((content, [NO_COLUMN + BETWEEN]) for content in (
-        'a,b,2\nb,c,3\n', 'Tag|Address\na|N7:0\n', '"Tag,Address"\n"a,N7:0"\n',
+        'a,b,2\nTag,c,3\nb,c,3\n', 'Tag|Address\na|N7:0\n', '"Tag,Address"\n"a,N7:0"\n',
         '<!DOCTYPE html>\n<html>\n', 'Tag Address Length\na N7:0 2\n')),
     *((content, [NO_COLUMN + RSLOGIX + BETWEEN]) for content in (
         'N7:0,"SPEED","Line speed"\n', 'a,n7:0/3,2\n', 'I:1.0/3,Global\n')),
@@ -188,8 +188,8 @@ LONG = 'x' * 100
           ('Tag;Address', 'a,N7:0', 'semicolon'), ('Tag\tAddress', 'a,N7:0', 'tab'))),
     # A quote that is not closed does not swallow the rows after it.
     ('Tag,Address\na,1\n"b,2\nc,3\n', [f'FILE:3:1: {OPEN}']),
-    ('"Tag,Address\na,1\n', [f'FILE:1:1: {OPEN}']), ('Tag,Address\na,"1', [f'FILE:2:2: {OPEN}']),
-    ('Tag,Address\na,"', [f'FILE:2:2: {OPEN}']),
+    ('#\n"Tag,Address\na,1\n', [f'FILE:2:1: {OPEN}']),
+    *((content, [f'FILE:2:2: {OPEN}']) for content in ('Tag,Address\na,"1', 'Tag,Address\na,"')),
     *((f'Tag{mark}Length\n"x{mark}""y""" {mark} "5 ""in"" {mark} "\u2002\n{row}\n', [
         f'FILE:3:2: {AFTER}'])
       for mark in ',;\t' for row in (f'a{mark}"1"0', f'"a" {mark} "5" pipe', f'{mark}"5""" "')),

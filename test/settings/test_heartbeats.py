@@ -133,12 +133,13 @@ def test_rule_1_file_with_a_meaning_is_no_place_to_count(address: str) -> None:
 
 
 def test_rule_3_requires_topics_with_a_time() -> None:
-    rows = (row(**WRITE), row(**BEAT, While='speed', While_Timeout='500'))
+    rows = (row(**BEAT, While='speed stop', While_Timeout='500'), row(**WRITE),
+            row(**WRITE | {'Tag': 'stop', 'Address': 'N10:2'}))
     mappings, problems = load_rows(*rows)
     assert problems == []
-    assert mappings[1].condition == While(('speed',), 500)
-    assert [cell_of(mappings[1], column) for column in ('While', 'While_Timeout')] == [
-        'speed', '500']
+    assert mappings[0].condition == While(('speed', 'stop'), 500)
+    assert [cell_of(mappings[0], column) for column in ('While', 'While_Timeout')] == [
+        'speed stop', '500']
 
 
 @pytest.mark.parametrize(('cells', 'text'), [
@@ -164,7 +165,7 @@ def test_rule_4_period_of_a_heartbeat(period: str) -> None:
     ({'Command': 'Serve', 'Fallback': '7', 'Fallback_After': '60000'}, Fallback((7.0,), 60000)),
     ({'Address': 'B3:0/4', 'Length': '2', 'Fallback': '0 0', 'Fallback_After': '500'},
      Fallback((0.0, 0.0), 500)),
-    ({'Scale': '0.1', 'Fallback': '12.5', 'Fallback_After': '500'}, Fallback((12.5,), 500))])
+    ({'Scale': '10', 'Fallback': '99990', 'Fallback_After': '500'}, Fallback((99990.0,), 500))])
 def test_rule_12_write_and_serve_rows_take_a_fallback(
         cells: dict[str, str], fallback: Fallback) -> None:
     mapping = one(**WRITE | cells)
@@ -225,7 +226,7 @@ def test_rule_13_values_depend_on_run_or_on_a_counter() -> None:
          'Heartbeat rows'),
         ({'Publish': 'Change'}, 'needs Publish Always'),
         ({'Publish': 'Change', 'While': 'RUN', 'While_Timeout': ''}, 'needs Publish Always'),
-        ({'While': 'RUN'}, 'RUN has no While_Timeout'),
+        ({'While': 'run'}, 'RUN has no While_Timeout'),
         ({'While': 'doors'}, 'cannot depend on itself'),
         ({'While': 'Doors'}, 'RUN or the tag of one good Read row; "Doors" is neither'),
         ({'While': ''}, 'While_Timeout is for a row with While'),

@@ -26,8 +26,8 @@ from abdf1_ros.pccc.processor import Processor, USUAL
 from abdf1_ros.pccc.values import ValueType, WordOrder
 from abdf1_ros.settings.columns import BY_NAME, COLUMNS, MAP_COLUMNS
 from abdf1_ros.settings.heartbeats import While
-from abdf1_ros.settings.mapping import Command, Mapping, Publish
-from abdf1_ros.settings.names import MAX_LENGTH, sanitise
+from abdf1_ros.settings.mapping import Command, Publish
+from abdf1_ros.settings.names import sanitise
 from abdf1_ros.settings.rows import Rows
 import pytest
 from support.cases import for_all
@@ -61,15 +61,6 @@ def test_function_file_of_a_micrologix_is_no_file_of_that_number() -> None:
     assert function.address.file == binary.address.file
     assert not binary.shares_words(function) and not function.shares_words(binary)
     assert function.shares_words(make_mapping('STI:0.PFN', 'Write', plc='SLC'))
-
-
-@for_all(('one', 'other', 'is_shared'), [
-    (make_mapping('N7:0', length=10), make_mapping('N7:12', length=5), False),
-    # It is not known which words of a slot those of the whole image are.
-    (make_mapping('I:5', plc='SLC', access='Flat'), make_mapping('I:1.0', plc='SLC'), True)])
-def test_rows_share_words_of_equal_numbers_or_what_is_not_known(
-        one: Mapping, other: Mapping, is_shared: bool) -> None:
-    assert one.shares_words(other) is other.shares_words(one) is is_shared
 
 
 def test_groups_of_rows_and_the_stations_of_the_plcs() -> None:
@@ -127,7 +118,3 @@ def test_accesses_stand_in_their_order(plc_type: PlcType) -> None:
     *((text, '') for text in ('', '_', '__', '/', '///', ':', 'ü', '日本', ' - / - '))])
 def test_name_of_a_text(text: str, name: str) -> None:
     assert sanitise(text) == name
-
-
-def test_longest_name_fits_with_namespace_and_node_into_what_dds_takes() -> None:
-    assert MAX_LENGTH + len('/write/') < 247

@@ -72,7 +72,7 @@ SPREADSHEET = ('; a spreadsheet may have made a date or time of it: give the col
     ('В3:0', FORM + '; character 1 is U+0412 CYRILLIC CAPITAL LETTER VE, not "B"'),
     ('N７:0', FORM + '; character 2 is U+FF17 FULLWIDTH DIGIT SEVEN, not "7"'),
     ('N7：0', FORM + '; character 3 is U+FF1A FULLWIDTH COLON, not ":"'),
-    ('N7:0–9', FORM + '; character 5 is U+2013 EN DASH, not "-"'),
+    ('N7:0–9', FORM + '; character 5 is U+2013 EN DASH, not "-"'), ('7:00h', FORM),
     ('N7:\x7f0', FORM + '; character 4 is U+007F'),
     ('N7:\u200b0', FORM + '; character 4 is U+200B ZERO WIDTH SPACE'),
     ('N7:\u00a00', FORM + '; character 4 is U+00A0 NO-BREAK SPACE, not " "')])
@@ -90,8 +90,9 @@ def test_address_that_cannot_be_used(tmp_path: Path, address: str, expected: str
         '!2:6 (Scale): Item: 1, Scale should not be 0']),
     (f'{HEAD}\n#N/A,Read,N7:0,1,SLC\n', [
         '!2:1: "#N/A" is what a spreadsheet writes where it has no value']),
-    (f'{HEAD}\n#REF!;x\na,Read,N7:0,1,SLC\n', [
-        '!2: this row is one cell; its cells need a comma between them, outside of quotes']),
+    *((f'{HEAD}\n#REF!{sign}x\na,Read,N7:0,1,SLC\n', [
+        '!2: this row is one cell; its cells need a comma between them, outside of quotes'])
+      for sign in ';\t'),
     (f'{HEAD}\n# N/A stays a comment\n#TODO!\n#N/A yet\na,Read,N7:0,1,SLC\n', []),
     *((f'{HEAD}\na,Read,{mark},1,SLC\nb,Read,N7:1,1,SLC\n', [
         f'!2:3: "{mark}" is what a spreadsheet writes where it has no value']) for mark in (
@@ -209,8 +210,8 @@ PORT = ('should be a number from 1, a device path such as /dev/ttyUSB0, socket:/
 @for_all(('text', 'expected'), [
     ('Com_Port,BaudRate\n1,9600\n', ['!1:2: unknown column "BaudRate"; did you mean Baud?']),
     ('Com_Port,Station No\n1,5\n', ['!1:2: unknown column "Station No"; did you mean Station?']),
-    ('Com_Port,Cmd Timeout\n1,5\n', [
-        '!1:2: unknown column "Cmd Timeout"; did you mean Cmd_Timeout?']),
+    ('Com_Port,CmdTimeout of this line\n1,5\n', [
+        '!1:2: unknown column "CmdTimeout of this line"; did you mean Cmd_Timeout?']),
     ('Station,5\nMode,Peer\nBaud,19200\n', [
         '!1: the names of the columns stand below each other here; they belong side by side into '
         'one row, and the values into the row below it']),

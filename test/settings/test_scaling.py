@@ -157,10 +157,10 @@ def test_limit_of_scaled_32_bits_is_kept_to_the_raw_step(
 
 
 def test_message_between_the_last_raw_step_and_the_limit_is_refused() -> None:
-    mapping = make_mapping('N7:0', 'Write', maximum=12.5, scaling=Scaling(2.0, 1.0))
-    assert raw_values(mapping, [11.4]) == [5]
-    with pytest.raises(FormatError, match='value 13 at index 0, the nearest that can be written'):
-        raw_values(mapping, [12.2])
+    mapping = make_mapping('N7:0', 'Write', length=2, maximum=12.5, scaling=Scaling(2.0, 1.0))
+    assert raw_values(mapping, [11.4, 1.0]) == [5, 0]
+    with pytest.raises(FormatError, match='value 13 at index 1, the nearest that can be written'):
+        raw_values(mapping, [11.4, 12.2])
 
 
 def test_limit_of_long_words_is_not_that_of_a_float32() -> None:
