@@ -64,15 +64,18 @@ def test_function_file_of_a_micrologix_is_no_file_of_that_number() -> None:
 
 
 def test_groups_of_rows_and_the_stations_of_the_plcs() -> None:
-    rows = Rows(make_mapping(command=command, station=station, condition=condition)
+    rows = Rows(make_mapping(command=command, station=station, condition=condition,
+                             is_on_demand=command == 'ReadWrite')
                 for command, station, condition in (
         ('Write', 255, None), ('Serve', 5, None), ('Read', 2, None), ('Write', 1, None),
         ('Read', 2, While(('RUN',))), ('ReadWrite', 3, None), ('Heartbeat', 4, While(('a',), 9))))
     assert rows.stations == (2, 1, 3, 4)
     assert {name: [row.station for row in getattr(rows, name)] for name in (
-        'served', 'published', 'messages', 'written', 'own', 'heartbeats', 'guarded')} == {
+        'served', 'published', 'messages', 'written', 'own', 'heartbeats', 'guarded', 'on_demand',
+        'repeated')} == {
         'served': [5], 'published': [5, 2, 2, 3], 'messages': [255, 5, 1, 3],
-        'written': [255, 1, 3, 4], 'own': [4], 'heartbeats': [4], 'guarded': [2]}
+        'written': [255, 1, 3, 4], 'own': [4], 'heartbeats': [4], 'guarded': [2],
+        'on_demand': [3], 'repeated': [255, 5, 2, 1, 2, 4]}
 
 
 @for_all(('text', 'kind', 'is_shared'), [

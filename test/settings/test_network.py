@@ -332,7 +332,7 @@ def test_list_may_have_single_stations_and_ranges(text: str, stations: tuple[int
 
 
 @for_all(('text', 'part'), [
-    ('255', '255'), ('1 2', '1 2'), ('1 2-3', '1 2-3'), ('1-', '1-'), ('5,1- ,2', '1-'),
+    ('255', '255'), ('1 2', '1 2'), ('1;3', '1;3'), ('1-', '1-'), ('5,1- ,2', '1-'),
     ('1,x', 'x'), ('3-1', '3-1'), ('-1', '-1'), ('1-2-3', '1-2-3'), ('a,1,b', 'a|b')])
 def test_parts_of_a_list_that_are_no_station_are_named(text: str, part: str) -> None:
     assert parse_stations(text)[1] == [

@@ -164,7 +164,7 @@ def test_message_between_the_last_raw_step_and_the_limit_is_refused() -> None:
 
 
 def test_limit_of_long_words_is_not_that_of_a_float32() -> None:
-    mapping = make_mapping('L10:0', 'Write', plc='SLC', maximum=16_777_217)
-    assert raw_values(mapping, [16_777_217]) == [16_777_217]
-    with pytest.raises(FormatError, match='outside Min -inf, Max 16777217'):
-        raw_values(mapping, [16_777_218])
+    mapping = make_mapping('L10:0', 'Write', plc='SLC', length=2, maximum=16_777_217)
+    assert raw_values(mapping, [16_777_217, 0]) == [16_777_217, 0]
+    with pytest.raises(FormatError, match='at index 1 is outside Min -inf, Max 16777217'):
+        raw_values(mapping, [0, 16_777_218])
