@@ -352,7 +352,7 @@ def remarks_of(folder: Path, row: str) -> list[str]:
         ':2:9 (Max): Max 40000 is above 32767, the most that int16 can hold here']),
     ('level,Write,N7:0,1,SLC,,,-32768,32767,', []),
     ('level,Write,N7:0,1,SLC,uint16,,0,40000,', []),
-    ('level,Write,N7:0,1,SLC,,,,4000,0.1', [
+    ('level,Serve,N7:0,5,SLC,,,,4000,0.1', [
         ':2:9 (Max): Max 4000 is above 3276.7, the most that int16 can hold here']),
     ('N7:0,Read,N7:0,1,SLC,,,,,', [':2:1 (Tag): Tag "N7:0" becomes the topic N7_0']),
     ('N7:0,Read,N7:0,1,SLC,,a b,,,', [':2:7 (Topic): Topic "a b" becomes the topic a_b']),
@@ -367,8 +367,7 @@ def remarks_of(folder: Path, row: str) -> list[str]:
     ('timer,Read,030,1,PLC2,bcd16,,,,', [
         ':2:6 (Type): 030: a PLC-2 has three digits in a word, and status bits above them: bcd12 '
         'reads and writes the digits alone']),
-    ('timer,Read,030,1,PLC2,bcd12,,,,', []),
-    ('speed,Read,N7:0,07,SLC,,,,,', []),
+    ('timer,Read,030,1,PLC2,bcd12,,,,', []), ('speed,Read,N7:0,07,SLC,,,,,', []),
     ('speed,Read,N7:0,018,SLC,,,,,', [])])
 def test_row_that_is_valid_and_odd(tmp_path: Path, row: str, expected: list[str]) -> None:
     assert remarks_of(tmp_path, row) == expected
