@@ -271,7 +271,7 @@ def test_number_after_a_timer_is_no_bit_unless_it_has_a_name(
     ('N7:O', SLC, 'that is the letter O where a digit should be; write N7:0'),
     ('N1O:1O-2O', PLC5, 'that is the letter O where a digit should be; write N10:10-20'),
     ('B3:0/O', PLC5, 'that is the letter O where a digit should be; write B3:0/0'),
-    ('O:OO1/O0', PLC5, 'that is the letter O where a digit should be; write O:001/00'),
+    ('O:OO1/O0-O7', PLC5, 'that is the letter O where a digit should be; write O:001/00-07'),
     ('T4:O.ACC', SLC, 'that is the letter O where a digit should be; write T4:0.ACC'),
     ('HSC:0.6', SLC, 'word 6 is the second half of an int32; write the first, 5'),
     ('RTC:0.HR', SLC, 'RTC is a function file whose type code is not known (S:37 to S:42 may '

@@ -111,7 +111,6 @@ def test_what_may_be_written(letters: str, family: PlcType, names: str) -> None:
 def test_what_has_no_name_may_not_be_written(letters: str, family: PlcType, word: int,
                                              bit: int | None) -> None:
     assert not FAMILIES[family].layout(FileType(letters)).may_write(word, bit)
-    assert FAMILIES[PLC5].layout(FileType.TIMER).may_write(1, 7)  # a bit of a value
     assert FAMILIES[PLC5].layout(FileType.PID).may_write(3)  # its second word
 
 

@@ -172,12 +172,13 @@ def test_words_of_the_texts_of_faults() -> None:
      ('major processor fault (word S:11 says which)', 'bad RAM'), (
          'download in progress', 'testing edits', 'edits in the processor', 'forces active',
          'forces installed', 'memory protected')),
-    (changed(PLC3, byte1=0x38), ('major processor fault', 'shutdown in effect'),
-     ('shutdown requested',)),
-    (changed(PLC2, byte1=0x38), (
+    (changed(SLC, byte1=0x80, byte19=0x26), (), ('forces active', 'edits in the processor')),
+    (changed(PLC3, byte1=0x28), ('major processor fault', 'shutdown in effect'), ()),
+    (changed(PLC3, byte1=0x10), (), ('shutdown requested',)),
+    (changed(PLC2, byte1=0x28), (
         'no communication between module and processor',
-        'communication zone of the program has a wrong format'),
-     ('download or upload in progress',))])
+        'communication zone of the program has a wrong format'), ()),
+    (changed(PLC2, byte1=0x10), (), ('download or upload in progress',))])
 def test_faults_and_remarks(identity: Identity, faults: tuple[str, ...],
                             remarks: tuple[str, ...]) -> None:
     assert (identity.faults, identity.remarks) == (faults, remarks)
@@ -190,7 +191,7 @@ def test_each_bit_of_a_plc5_has_one_remark_or_none() -> None:
     none: tuple[str, ...] = ()
     assert {bit for bit, remarks in told.items() if remarks != none} == {
         (1, 4), (1, 6), (1, 7), (16, 0), (16, 4), *((17, bit) for bit in range(8))}
-    assert told[1, 7] == ('edits in the processor',)
+    assert (told[1, 7], told[16, 0]) == (('edits in the processor',), ('forces active',))
     assert [changed(PLC5, byte1=mode, byte16=0, byte17=0).remarks for mode in range(8)] == [
         none] * 8
 
