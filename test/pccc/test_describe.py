@@ -72,6 +72,7 @@ def command(data: str, cmd: int = 0x0F) -> Packet:
      'with "$"): 01 00 00 01 00 00 00 02'),
     ('01 00 00 01 00 2E 01 08 0A 00 02', 'word range read B10:0, 1 word'),
     ('01 00 00 01 00 34 03 04 02 02', 'word range read T:4.ACC, 1 word'),
+    ('01 00 00 01 00 2C 03 00 02 02', 'word range read T:0.ACC, 1 word'),
     ('01 00 00 01 00 34 03 04 03 02', 'word range read E3.1.3.0.4.3, 1 word'),
     ('01 00 00 01 00 3C 08 0A 02 05 02', 'word range read E3.1.8.10.2.5, 1 word'),
     ('00 00 00 02 00 07 00 07 05 01 00 FF FF', 'word range write N7:5 = 0001 FFFF'),

@@ -175,9 +175,8 @@ def test_words_of_the_texts_of_faults() -> None:
     (changed(SLC, byte1=0x80, byte19=0x26), (), ('forces active', 'edits in the processor')),
     (changed(PLC3, byte1=0x28), ('major processor fault', 'shutdown in effect'), ()),
     (changed(PLC3, byte1=0x10), (), ('shutdown requested',)),
-    (changed(PLC2, byte1=0x28), (
-        'no communication between module and processor',
-        'communication zone of the program has a wrong format'), ()),
+    (changed(PLC2, byte1=0x28), ('no communication between module and processor',
+                                 'communication zone of the program has a wrong format'), ()),
     (changed(PLC2, byte1=0x10), (), ('download or upload in progress',))])
 def test_faults_and_remarks(identity: Identity, faults: tuple[str, ...],
                             remarks: tuple[str, ...]) -> None:

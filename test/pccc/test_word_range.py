@@ -189,7 +189,7 @@ def test_structures_are_words_in_the_order_of_storage() -> None:
     ('01 01 00 01 00 06 07 00 02', 0xF0, '01'), ('01 00 00 7B 00 06 07 00 F6', 0xF0, '01'),
     ('00 00 00 01 00 06 07 00', 0xF0, '01'), ('00 00 00 02 00 06 07 03 01 00 02 00', 0xF0, '0A'),
     ('00 00 00 77 00 06 07 00' + ' 00' * 238, 0xF0, '01'), ('02 06 07 04 01 00 00 00', 0xF0, '07'),
-    ('02 06 07 00 01 00 01 00', 0x10, ''), ('01 00 00 01 00 06 07', 0x10, '')])
+    ('01 00 00 01 00 06 07 00 02 01', 0x10, ''), ('01 00 00 01 00 06 07', 0x10, '')])
 def test_command_that_a_plc5_refuses_changes_nothing(data: str, sts: int, ext_sts: str) -> None:
     memory = table(PLC5, N7_0=counting(4))
     assert ask(memory, data) == (sts, ext_sts)
