@@ -250,7 +250,8 @@ def test_tx_delay_passes_before_each_transmission() -> None:
 def test_what_comes_during_a_delay_in_full_duplex_is_delivered_at_its_end() -> None:
     bench = Bench(Send(FRAME, 1.0), Listen(1.0), timing=LineTiming(tx_delay=0.25),
                   duplex=Duplex.FULL)
-    bench.machine.receive_data(ACK + ACK, 0.1)
+    for now in (0.1, 0.24):
+        bench.machine.receive_data(ACK, now)
     assert bench.got == []
     bench.machine.handle_timeout(0.25)
     assert bench.got == [SAID_ACK, SAID_ACK]
@@ -437,10 +438,10 @@ def test_wake_ends_a_rest() -> None:
 
 @pytest.mark.parametrize('step', [Send(FRAME, 1.0), Listen(1.0), Send(FRAME, 1.0, 0.5)])
 def test_wake_disturbs_no_transaction(step: Step) -> None:
-    bench = Bench(step)
+    bench = Bench(step, background=(clockwork := Clockwork(math.inf)))
     deadline = bench.machine.deadline
     bench.machine.wake(0.25)
-    assert (bench.got, bench.machine.deadline) == ([], deadline)
+    assert (bench.got, bench.machine.deadline, clockwork.done) == ([], deadline, [0.25])
 
 
 def test_stop_raises_its_error_inside_the_procedure() -> None:
@@ -490,6 +491,7 @@ class Asked:
                 self.told.append('silence')
         except CommandExpired:
             self.told.append('expired')
+        yield Listen(0)
         yield Rest()
 
 
@@ -514,6 +516,7 @@ def test_command_that_expires_before_it_is_given_to_the_port_is_taken_back(embed
 
     def run(machine: Machine) -> Procedure:
         machine.sender.embeds = embeds
+        yield Send(NAK)  # does not come back either
         try:
             yield Send(message_frame(bytes(200), Checksum.CRC), 1.0, expires=5.5)
         except CommandExpired:
@@ -524,10 +527,10 @@ def test_command_that_expires_before_it_is_given_to_the_port_is_taken_back(embed
     machine.start(5.0)
     assert machine.sender.send_before == 5.5
     machine.withdraw(6.0)
-    assert (told, machine.data_to_send()) == (['expired'], ACK)
+    assert (told, machine.data_to_send()) == (['expired'], NAK + ACK)
     assert machine.sender.send_before == math.inf
     sender = machine.sender
-    assert (machine.counters.chars_sent, sender.position, sender.still_here) == (2, 2, 0)
+    assert (machine.counters.chars_sent, sender.position, sender.still_here) == (4, 4, 0)
     assert machine.next_call == pytest.approx(6.0 + 1.0 + 0.02)
     machine.handle_timeout(6.05)
     assert machine.data_to_send() == b''
@@ -650,11 +653,10 @@ def portions(frame: bytes, checksum: Checksum, response: bytes, at: int) -> list
 def test_message_and_response_both_arrive(data: list[int], checksum: Checksum, response: bytes,
                                           at: int) -> None:
     decoder = FrameDecoder(checksum, Duplex.FULL)
-    symbols = []
+    symbols: list[Symbol] = []
     for part in portions(message_frame(bytes(data), checksum), checksum, response, at):
         decoder.feed(part)
-        while (symbol := decoder.next_symbol()) is not None:
-            symbols.append(symbol)
+        symbols += iter(decoder.next_symbol, None)
     assert Frame in map(type, symbols)
     frame, = (symbol for symbol in symbols if isinstance(symbol, Frame))
     assert (frame.data, frame.fault) == (bytes(data), None)
@@ -668,6 +670,7 @@ def test_line_never_waits_for_the_next_portion_nor_runs_far_ahead(checksum: Chec
     frame = message_frame(bytes(range(250)), checksum)
     outgoing = Outgoing(checksum, CHAR_TIME)
     busy_until = 5.0 + len(outgoing.put(frame, 5.0) + outgoing.put(frame, 5.0)) * CHAR_TIME
+    assert busy_until < 5.04  # of the second frame, nothing goes out yet
     while outgoing.due is not None:
         now = outgoing.due
         assert 0.01 < busy_until - now < 0.02

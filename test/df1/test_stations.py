@@ -250,13 +250,16 @@ def test_texts_of_the_vectors(name: str, text: str) -> None:
 def test_what_a_node_on_the_way_says_to_a_guest_says_nothing_about_the_station(
         blames: bool) -> None:
     stations = ActiveStationList([1])
+    stations[1].unanswered = 3
     accounting = Accounting(Counters(), stations, lambda event: None, 5)
-    task = CommandTask(Packet(1, 9, 0x0F, 0, 7, b''), lambda: 0.0)
-    task.blames = blames
-    accounting.complete(task, task.command.reply(sts=0x02), keeps_others_waiting=True)
+    for waits in (True, False):
+        task = CommandTask(Packet(1, 9, 0x0F, 0, 7, b''), lambda: 0.0)
+        task.blames = blames
+        accounting.complete(task, task.command.reply(sts=0x02), keeps_others_waiting=waits)
     echo = CommandTask(Packet(1, 9, 0x06, 0, 8, b''), lambda: 0.0)  # the node may execute it
     accounting.complete(echo, echo.command.reply(), keeps_others_waiting=True)
-    assert (stations[1].local_status, stations[1].overdue) == ((2, 1) if blames else (0, 0))
+    station = stations[1]
+    assert (station.local_status, station.overdue, station.unanswered) == (2 * blames, blames, 0)
     for now, sts, heard in ((1.0, 0x02, None), (2.0, 0x10, 2.0)):
         accounting.unexpected(Packet(5, 1, 0x4F, sts, 9), now)
         assert stations[1].last_heard == heard
