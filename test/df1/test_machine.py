@@ -187,13 +187,14 @@ def test_reflex_does_not_overtake_what_still_has_to_go_out() -> None:
 def test_reflex_waits_for_the_rest_of_a_divided_message() -> None:
     def run(machine: Machine) -> Procedure:
         machine.sender.embeds = True
-        yield Send(MESSAGE, 1.0, reflex=eot_on_ack)
+        yield Send(MESSAGE, 1.0, expires=30.0, reflex=eot_on_ack)
         yield Send(EOT, 1.0, expires=5.0)
 
     machine = Machine(run, checksum=Checksum.CRC, timing=LineTiming(0.01), duplex=Duplex.FULL)
     machine.start(0.0)
     sent = machine.data_to_send()
     assert machine.sender.still_here == len(MESSAGE) - len(sent) > 0
+    assert machine.deadline == pytest.approx(0.01 * len(MESSAGE) + 1.0)
     machine.receive_data(ACK, 0.1)
     assert machine.sender.send_before == math.inf  # half a message is never taken back
     sent += machine.data_to_send()
@@ -201,7 +202,8 @@ def test_reflex_waits_for_the_rest_of_a_divided_message() -> None:
     assert sent + machine.data_to_send() == MESSAGE + EOT
     machine.start(20.0)
     machine.stop()  # nothing is left of the second message
-    assert (machine.next_call, machine.sender.still_here) == (None, 0)
+    sender = machine.sender
+    assert (machine.next_call, sender.still_here, sender.send_before) == (None, 0, math.inf)
 
 
 def test_procedure_that_does_not_send_its_reflex_is_a_bug_until_the_next_start() -> None:

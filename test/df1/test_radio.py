@@ -112,14 +112,18 @@ class Bench(Node):
         return said
 
 
-def test_command_of_a_guest_without_reply_says_nothing_about_the_station() -> None:
-    bench = Bench(nak_retries=1)
+def test_command_of_a_guest_without_reply_says_nothing_about_the_station(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    most: list[float] = []
+    monkeypatch.setattr(Random, 'uniform', lambda self, low, high: most.append(high) or low)
+    bench = Bench(nak_retries=5)
     task = bench.begin(COMMAND)
     task.blames = False
-    assert bench.wait(30.0) == [framed(COMMAND)] * 2
+    assert bench.wait(30.0) == [framed(COMMAND)] * 6
     assert isinstance(task.result, StationInactive)
+    assert [high / most[0] for high in most] == pytest.approx([1, 2, 4, 8, 8, 8])
     assert (bench.stations[PLC].active, bench.stations[PLC].unanswered) == (True, 0)
-    assert bench.numbers() == [2521, 2508, 2519]
+    assert bench.numbers() == [*5 * [2521], 2508, 2519]
 
 
 def test_command_is_not_repeated_that_has_its_reply_before_the_line_is_quiet() -> None:
@@ -174,6 +178,9 @@ def test_repetition_is_known_whatever_many_others_have_sent_since() -> None:
     bench.wait(3.0)
     bench.hear(framed(THEIRS._replace(src=3)), framed(THEIRS))
     assert (bench.executed[PLC, THEIRS.tns], len(bench.executed)) == (1, 36)
+    bench.wait(60.0)
+    bench.hear(framed(THEIRS._replace(src=3)))
+    assert bench.executed[3, THEIRS.tns] == 2
 
 
 def test_sender_that_always_counts_zero_is_served_after_a_while() -> None:
@@ -201,10 +208,11 @@ def test_command_that_may_have_waited_while_this_process_stood_still_has_to_come
 
 
 def test_command_for_which_there_is_no_room_is_not_executed() -> None:
-    bench = Bench()
-    commands = [framed(THEIRS._replace(tns=tns)) for tns in range(18)]
-    bench.hear(*commands)
-    assert (bench.machine.counters.refused_for_memory, len(bench.executed)) == (1, 17)
+    for dst, executed in ((OTHER, 0), (US, 17)):
+        bench = Bench(store_forward={PLC, OTHER})
+        commands = [framed(THEIRS._replace(dst=dst, tns=tns)) for tns in range(18)]
+        bench.hear(*commands)
+        assert (bench.machine.counters.refused_for_memory, len(bench.executed)) == (1, executed)
     bench.wait(10.0)
     bench.hear(commands[-1])
     assert bench.executed[PLC, 17] == 1
@@ -240,6 +248,10 @@ def test_packet_is_sent_on_within_cmd_timeout_or_not_at_all() -> None:
             bench.hear(b'\x55' * 20)
             assert bench.wait(0.03) == []
         assert bench.wait(3.0) == said
+    for pause, said in ((5.0, []), (8.0, [framed(other)])):  # some always send the same
+        bench.wait(pause)
+        bench.hear(framed(other._replace(src=9)), framed(other))
+        assert bench.wait(2.0) == said
     bench.now += 30.0  # this process stands still
     bench.machine.handle_timeout(bench.now)
     bench.hear(framed(other._replace(tns=9)))

@@ -100,11 +100,12 @@ def test_command_that_the_master_did_not_acknowledge_expires() -> None:
     bench.now += 2.0  # just in time
     assert bench.poll() == bench.own(own())
     bench.now += 0.1
-    assert bench.poll() == EOT
+    assert bench.hear(bench.frame(FROM_MASTER)) == ACK  # which does not expire
+    assert bench.poll() == bench.own(FROM_MASTER.reply())
     assert isinstance(task.result, CommandExpired) and task.sent
 
 
-@pytest.mark.parametrize('sent_before', [0, 1])
+@pytest.mark.parametrize('sent_before', [0, 1, 2])
 def test_command_that_is_too_old_when_the_port_is_to_have_it_does_not_leave(
         sent_before: int) -> None:
     bench = SlaveBench(SETTINGS)
@@ -119,7 +120,7 @@ def test_command_that_is_too_old_when_the_port_is_to_have_it_does_not_leave(
     assert task.sent is bool(sent_before)
     counts = bench.counts()
     assert [counts.get(name, 0) for name in ('messages_sent', 'commands_sent', 'nak_retries')] == [
-        sent_before, sent_before, 0]
+        sent_before, min(sent_before, 1), max(sent_before - 1, 0)]
     bench.now += 3.0
     assert bench.poll() == EOT
     bench.hear(bench.frame(FROM_MASTER))
@@ -178,6 +179,7 @@ def test_command_that_may_have_waited_while_this_process_stood_still_has_to_come
         command = FROM_MASTER._replace(dst=dst)
         heard = poll_frame(US) + bench.frame(command, station)  # the poll is over, too
         assert (bench.hear(heard), bench.served) == (b'', [])
+    assert bench.poll() == EOT
     bench.wait(0.5)
     assert (bench.hear(bench.frame(FROM_MASTER)), bench.served) == (ACK, [FROM_MASTER])
 
@@ -189,6 +191,8 @@ def test_command_for_a_node_behind_us_is_refused_and_counted() -> None:
     assert bench.poll() == bench.own(astray.reply(sts=0x02))
     assert bench.served == []
     assert bench.counts()['invalid_messages'] == 1
+    bench = SlaveBench(SETTINGS, station=0)  # DST may have lost its place to another byte
+    assert bench.hear(bench.frame(astray)) == b''
 
 
 def test_broadcast_needs_no_answer_and_so_no_tx_delay() -> None:

@@ -89,10 +89,12 @@ def test_active_node_table_has_a_bit_for_each_station(number: int, word: int, bi
 
 @for_all('other', [{'tns': 0x0103}, {'src': 8}, {'cmd': 0x41}, {'dst': 6}])
 def test_only_the_last_message_counts_as_repeated(other: dict[str, int]) -> None:
-    station = Station(7)
+    station = Station(7, last_refused=REPLY.encode())
     packets = (REPLY, REPLY, REPLY._replace(sts=0x10, data=b'other'),
                REPLY._replace(**other), REPLY)  # type: ignore[arg-type]
     assert [station.note_new(packet) for packet in packets] == [True, False, False, True, True]
+    station.forget_last()
+    assert station == Station(7)
 
 
 def test_station_may_be_absent_beside_another_that_has_replied() -> None:
@@ -152,8 +154,7 @@ def test_message_that_came_too_early_has_the_next_turn_and_the_round_the_one_aft
     probes.spent(1.0, 1.0)
     assert probes.next == 8.0
     assert not probes.claim_message(7.9)
-    assert probes.next == 15.0
-    assert probes.claim_message(8.0)
+    assert probes.claim_message(8.0) and probes.next == 15.0
     probes.spent(1.0, 9.0, Asker.MESSAGE)
     assert probes.next == 16.0
     assert not probes.claim_message(22.9) and probes.claim_message(23.0)
@@ -168,7 +169,7 @@ def test_own_writes_take_turns_with_all_others() -> None:
     assert (probes.next, probes.next_own) == (8.0, 15.0)  # a read may have its turn
     probes.spent(1.0, 9.0)
     assert (probes.next, probes.next_own) == (16.0, 16.0)
-    assert not probes.claim_message(15.0)
+    assert (probes.claim_message(15.0), probes.next_own) == (False, 23.0)
     probes.keep_none_waiting(20.0, Asker.OWN)
     assert (probes.next, probes.next_own) == (20.0, 27.0)
 

@@ -102,10 +102,12 @@ class Late(LinkThread):
 def test_long_reply_at_a_low_speed_is_heard_to_its_end(char_time: float) -> None:
     packet = Packet(1, 5, 0x0F, 0, 7).reply(bytes(234))
     script = Script(Send(b'?', 0.3, reply_size=234), timing=LineTiming(char_time=char_time))
+    script.machine.came = came = Mock()  # type: ignore[method-assign]
     port = SlowLine(message_frame(packet.encode(), Checksum.CRC), char_time)
     thread = Late(script.machine, port)
     thread.run()
     assert isinstance(script.next(), Frame)
+    assert {call.args[0] for call in came.call_args_list} == {0}  # a terminal keeps few bytes
     thread.stop()
 
 

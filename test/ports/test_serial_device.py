@@ -332,11 +332,11 @@ def test_line_that_takes_no_byte_for_three_seconds_is_a_lost_port(
     monkeypatch.setattr(serial_device, 'time', SimpleNamespace(
         monotonic=lambda: now, sleep=time.sleep))
     monkeypatch.setattr(SerialDevice, 'unsent', lambda _: unsent)
-    port.write(bytes(6))
-    for wait, left in ((1.1, 6), (1.1, 6), (1.0, 5), (2.9, 5)):  # at last one byte leaves
+    # Nothing waits for long; then what is written waits, until at last one byte leaves.
+    for wait, left in ((9.0, 0), (1.1, 1), (1.1, 2), (1.0, 2), (2.9, 3)):
         now, unsent = now + wait, left
-        port.look()  # type: ignore[attr-defined]
-    now += 1.0
+        port.write(b'y')
+    now, unsent = now + 1.0, 4
     with pytest.raises(OSError, match='the line takes no data; is Handshake right?'):
         port.write(b'x')
     unsent = 0
