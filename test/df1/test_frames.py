@@ -16,7 +16,7 @@
 
 from typing import Any
 
-from abdf1_ros.df1.checksum import bcc, Checksum
+from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import (
     ACK,
     Code,
@@ -153,11 +153,7 @@ def test_noise_between_symbols_is_skipped_and_its_last_byte_kept() -> None:
 @for_all('chunk', [None, 1])
 def test_poll_of_any_station(station: int, chunk: int | None) -> None:
     assert decode(poll_frame(station), chunk=chunk) == [Poll(station, True)]
-
-
-def test_station_10_is_doubled_in_a_poll_but_its_bcc_is_not_stuffed() -> None:
-    assert poll_frame(0x10) == bytes.fromhex('10 05 10 10 F0')
-    assert poll_frame(0xF0) == bytes.fromhex('10 05 F0 10')
+    assert poll_frame(0xF0) == bytes.fromhex('10 05 F0 10')  # a BCC is not doubled
 
 
 @pytest.mark.parametrize('chunk', [None, 1])
@@ -276,12 +272,6 @@ def test_message_with_a_damaged_character_is_not_a_good_one(checksum: Checksum, 
     decoder.next_symbol()
     decoder.feed(message[2:])
     assert good in drain(decoder)
-
-
-@for_all(('data', 'value'), [
-    ('08 09 06 00 02 04 03', 0xE0), ('08 09 06 00 10 04 03', 0xD2), ('', 0), ('80 80', 0)])
-def test_bcc_of_the_manual(data: str, value: int) -> None:
-    assert bcc(bytes.fromhex(data)) == value
 
 
 COMMAND = Packet(dst=17, src=5, cmd=0x2F, sts=0, tns=0x0102, data=b'\xA2')  # of priority

@@ -127,24 +127,12 @@ def test_ack_before_a_byte_of_our_message_is_handed_over_does_not_count() -> Non
     assert peer.wait(1.1) == [(1.0, ENQ)]
 
 
-def embedding(peer: PeerBench) -> None:
-    """Let the other end show that it embeds responses."""
-    peer.begin(COMMAND)
-    peer.said()
-    frame = peer.frame(THEIRS)
-    assert peer.hear(frame[:5] + ACK) == b''
-    assert peer.hear(frame[5:]) == ACK + peer.frame(OUR_REPLY)
-    assert peer.hear(ACK) == b''
-    assert peer.hear_packet(REPLY) == ACK
-    peer.wait(1.0)
-
-
 def test_whether_to_embed_is_found_out_anew_with_the_port() -> None:
     peer = bench(timing=LineTiming(char_time=0.001))
-    damaged = peer.frame(THEIRS)[:5] + ACK + bytes(10) + ETX + bytes(2)
-    assert peer.hear(damaged) == NAK
+    frame = peer.frame(THEIRS)
+    assert peer.hear(frame[:5] + ACK + bytes(10) + ETX + bytes(2)) == NAK
     assert not peer.machine.sender.embeds  # the ACK may be damage, too
-    embedding(peer)
+    assert peer.hear(frame[:5] + ACK + frame[5:]) == ACK + peer.frame(OUR_REPLY)
     assert peer.machine.sender.embeds
     peer.start()
     assert not peer.machine.sender.embeds
