@@ -193,12 +193,18 @@ def test_message_that_a_gateway_does_not_take_says_nothing_about_the_gateway(
         standard: bool) -> None:
     rig = bench(standard, 7, 9)
     rig.master.stations.routes[8] = 7
+    rig.master.stations[8].replies = 1
     rig[7].deaf = True
     rig.message(9, 8)
     rig.start()
     poll(rig, 9, times=3)
     assert [reply.sts for reply in rig[9].heard] == [2]
     assert str(rig.ask(8, run=0.5).result) == str(StationInactive(8))
+    assert rig.master.said.split().count('C7') == 3  # twice, then once for the silent station
+    assert isinstance(rig.ask(7, run=0.5).result, CommandTimeout)
+    rig[7].deaf = False
+    assert isinstance(rig.ask(8, cmd=0x06, run=0.5).result, Packet)  # perhaps the gateway's own
+    assert not rig.master.stations[8].active
     assert (7, False) not in rig.master.changes
     assert rig.master.stations.probes.died_at > 0.0  # the PLC was not silent before
 

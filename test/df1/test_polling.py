@@ -217,13 +217,14 @@ def test_message_that_is_late_for_its_poll_belongs_to_the_station_that_sends_it(
     rig.line.run(lambda: 'P2' in rig.master.said, 1.0)
     begun = rig.clock()
     late = task.command.reply() if is_waited_for else Packet(5, 1, 0x4F, 0, 0x77)
-    rig.master.machine.receive_data(message_frame(late.encode(), Checksum.CRC), begun + 0.05)
+    for packet in (late, late._replace(dst=9, tns=0x88)):  # the second is for another node
+        rig.master.machine.receive_data(message_frame(packet.encode(), Checksum.CRC), begun + 0.05)
     assert rig.master.stations[1].last_heard == begun + 0.05
     assert rig.master.stations[2].last_heard is None
     assert rig.master.machine.data_to_send() == b''  # its ACK would be taken for station 2's
     assert ended(task) is is_waited_for
     counts = rig.master.counts()
-    assert counts['messages_received'] == counts['replies_received'] == 1
+    assert (counts['messages_received'], counts['replies_received']) == (2, 1)
     assert counts.get('stale_messages', 0) == (not is_waited_for)
     assert 'invalid_messages' not in counts
     if not is_waited_for:

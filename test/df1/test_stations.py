@@ -32,11 +32,6 @@ from support.vectors import vector
 REPLY = Packet(dst=5, src=7, cmd=0x4F, sts=0, tns=0x0102)
 
 
-def test_every_station_counts_as_active_at_start() -> None:
-    stations = ActiveStationList([9, 3, 3])
-    assert [(station.number, station.active) for station in stations] == [(3, True), (9, True)]
-
-
 def test_station_outside_of_the_list_has_a_record_and_no_place_in_it() -> None:
     told: list[Station] = []
     stations = ActiveStationList([9], told.append)
@@ -112,9 +107,10 @@ def test_one_late_reply_is_an_accident_and_two_are_not() -> None:
 def test_stations_behind_a_gateway_are_what_it_is() -> None:
     changes: list[tuple[int, bool]] = []
     stations = ActiveStationList(
-        (1, 2, 3), lambda station: changes.append((station.number, station.active)),
+        (3, 1, 2, 2), lambda station: changes.append((station.number, station.active)),
         {2: 10, 3: 10})
-    assert [station.number for station in stations] == [1, 2, 3, 10]
+    assert [(each.number, each.active) for each in stations] == [
+        (1, True), (2, True), (3, True), (10, True)]
     assert [stations.via(number) for number in (1, 2, 3, 10, 77)] == [1, 10, 10, 10, 77]
     assert stations.behind(10) == [10, 2, 3]
     stations.lost(10, 5.0)

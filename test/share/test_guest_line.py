@@ -247,7 +247,7 @@ class Queue(GuestQueue):
 def guest_line(place: str, put: Callable[[GuestCommand], None] = lambda command: None,
                wake: Callable[[], None] = lambda: None, clock: Callable[[], float] = line_time,
                fault: Callable[[Exception], None] = lambda error: None) -> GuestLine:
-    network = Network(share=place, parity='Even', stop_bits=2)
+    network = Network(share=place, parity='Odd', stop_bits=2)
     return GuestLine(*share_places(place), network, Queue(put), wake, GuestListener(), fault,
                      clock)
 
@@ -313,8 +313,8 @@ def test_internal_error_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @for_all(('place', 'bits', 'baud'), [
-    ('/dev/ttyS9?baud=1200&parity=None', 11, 1200), ('/dev/ttyS9', 12, 9600),
-    ('pty:/tmp/hmi', 0, 1), ('tcp:4501', 0, 1)])
+    ('/dev/ttyS9?baud=1200&parity=None', 11, 1200), ('/dev/ttyS9?parity=Even', 12, 9600),
+    ('/dev/ttyS9', 12, 9600), ('pty:/tmp/hmi', 0, 1), ('tcp:4501', 0, 1)])
 def test_characters_take_time_on_a_serial_device(place: str, bits: int, baud: int) -> None:
     """A reply that leaves slowly is not asked for with ENQ before it can have come."""
     line = guest_line(place)
