@@ -120,7 +120,7 @@ def test_until_signals_are_handled_little_is_imported() -> None:
     assert not imported_by('import abdf1_ros.__main__') & slow
 
 
-@pytest.mark.parametrize('name', ['check', 'sniff'])
+@pytest.mark.parametrize('name', ['check', 'plan', 'sniff'])
 def test_pictures_are_imported_where_they_are_drawn(name: str) -> None:
     pictures = {f'abdf1_ros.cli.{module}' for module in (
         'lanes', 'check_picture', 'overhearing', 'sniff_picture', 'sniff_report')}
@@ -219,7 +219,7 @@ def test_first_word_that_is_no_command(given: list[str], status: int, told: str)
     assert (said.returncode, told in said.stdout + said.stderr) == (status, True)
 
 
-@pytest.mark.parametrize('name', ['check', 'sniff'])
+@pytest.mark.parametrize('name', ['check', 'plan', 'sniff'])
 def test_all_that_commands_tell_is_as_stored(
         name: str, tmp_path: Path, capsys: Output, monkeypatch: pytest.MonkeyPatch) -> None:
     """After a change that is wanted, run it with UPDATE_STORED=1 and look at the difference."""
