@@ -92,7 +92,7 @@ def _listen_fault(mapping: Mapping) -> tuple[str, str] | None:
     if mapping.command is not Command.READ:
         return 'Command', (f'{mapping.command.value} sends commands, and Mode Listen sends '
                            'nothing; only Read rows are possible')
-    if not mapping.period or mapping.is_on_demand:
+    if not mapping.period:
         return 'Period', ('Mode Listen needs a Period above 0: the longest time (ms) between two '
                           'reads of these words by the other master')
     if mapping.access in (Access.CIF, Access.FLAT):

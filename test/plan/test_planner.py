@@ -200,10 +200,12 @@ def test_float_of_a_pid_is_read_alone_or_with_its_whole_element(
 def test_halves_of_a_block_with_a_float_are_the_floats() -> None:
     planner = Planner(LINE, 0.1)
     block, = planner.plan([
-        make_mapping(f'PD9:1.{name}') for name in ('SP', 'KP', 'KI', 'KD', 'PV')])
+        make_mapping(f'PD9:1.{name}', tag=tag) for name, tag in (
+            ('SP', 'a'), ('KP', 'b'), ('SP', 'c'), ('KD', 'd'), ('PV', 'e'))])
     halves = planner.split(block)
     assert sorted(map(len, (half.mappings for half in halves))) == [2, 3]
-    assert {spans([part])[0][1] for half in halves for part in planner.split(half)} <= {2, 82}
+    assert [spans(planner.split(half)) for half in halves] == [
+        [(f'PD9:1.{name}', 2) for name in names.split()] for names in ('SP KP', 'KD PV')]
 
 
 @pytest.mark.parametrize('name, limit', [
@@ -221,10 +223,10 @@ def test_blocks_are_as_long_as_the_processor_takes_them(name: str, limit: int) -
 
 
 def test_words_that_are_no_value_are_told_with_their_place() -> None:
-    level = make_mapping('N7:0', kind='bcd16', tag='level')
-    line = Mock(ask=Mock(return_value=b'\xCD\xAB'))
-    with pytest.raises(FormatError, match=r'^level \(N7:0 of station 1\): word ABCD is not BCD'):
-        list(read_planned(Planner(LINE, 0.1), [level], line))
+    rows = [make_mapping(), make_mapping('N7:1', kind='bcd16', tag='level')]
+    line = Mock(ask=Mock(return_value=b'\x00\x00\xCD\xAB'))
+    with pytest.raises(FormatError, match=r'^level \(N7:1 of station 1\): word ABCD is not BCD'):
+        list(read_planned(Planner(LINE, 0.1), rows, line))
 
 
 @pytest.mark.parametrize('plc', ['PLC5', 'SLC'])
@@ -344,9 +346,11 @@ def test_slow_mapping_beside_a_fast_one_is_read_with_it_while_that_is_cheaper() 
     assert blocks(1, 10_000) == 2
     rows = [make_mapping('N7:1', period=200, tag='beside'), make_mapping('N7:0', period=100),
             make_mapping('N7:0', period=90_000, length=90, tag='around'),
+            make_mapping('N7:0', period=95_000, tag='slow'),
             make_mapping('N7:99', period=200, tag='alone')]
     check_plan(rows, plan(*rows))
-    assert sorted(block.period for block in plan(*rows)) == [0.1, 0.2, 90]
+    assert sorted((block.period, len(block.mappings)) for block in plan(*rows)) == [
+        (0.1, 2), (0.2, 1), (90, 2)]
     assert 1 < words(1000) < words(500) < words(200) < words(100) < 40
 
 
@@ -358,9 +362,10 @@ def test_slow_row_within_a_fast_block_is_served_by_it_and_not_by_its_slow_neighb
 
 def test_line_that_is_full_anyhow_reads_a_slow_mapping_with_a_fast_one() -> None:
     pair = [make_mapping('N7:0', period=100), make_mapping('N7:20', period=10_000)]
+    planner = Planner(LINE, 0.1)
     for period, reads in (100, 1), (100_000, 2):  # the line can keep the longer Periods
         others = [make_mapping(f'N{file}:0', length=100, period=period) for file in range(9, 59)]
-        assert len(plan(*pair, *others)) == reads + len(others)
+        assert len(planner.plan([*pair, *others])) == reads + len(others)
 
 
 # refusals
@@ -400,6 +405,14 @@ def test_allowing_is_news_only_for_what_was_refused() -> None:
     assert not planner.allow(area, Span(5, 9))
     assert planner.allow(area, Span(3, 6))
     assert not planner.allow(area, Span(4, 6))
+    rows = [make_mapping(f'N7:{first}', plc='SLC', length=109) for first in (20, 129)]
+    area = plan(*rows)[0].station_area
+    for block in planner.plan(rows):
+        planner.shorten(planner.split(block)[0])
+    planner.refuse(area, Span(20, 129))
+    planner.allow(area, Span(20, 129))  # what is known of the other row stays
+    assert sorted(spans(planner.plan([*rows, make_mapping('N7:238', plc='SLC')]))) == [
+        ('N7:129', 54), ('N7:183', 54), ('N7:20', 109), ('N7:237', 1), ('N7:238', 1)]
 
 
 COMMAND, WORD, LIMIT = 50.0, 2.0, 110

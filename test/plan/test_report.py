@@ -472,6 +472,8 @@ def test_reads_without_a_period_are_expected_to_have_what_is_left() -> None:
     assert found == {0.0: pytest.approx(2 * time / left), 0.5: 0.5}
     found, time = expected((0, 2))
     assert found == {0.0: pytest.approx(2 * time)}
+    found, _ = expected((0, 2), own=((0.5, 0.5),))  # which leave nothing
+    assert found == {0.0: pytest.approx(10 * time)}
 
 
 @for_all(('period', 'is_full'), [(100, True), (300, False)])

@@ -45,7 +45,7 @@ def test_serve_needs_our_plc_type() -> None:
 
 
 def test_serve_needs_our_station() -> None:
-    assert texts(make_mapping('N7:50', 'Serve', station=1, item=7)) == [
+    assert texts(make_mapping('N7:50', 'Serve', station=0, item=7)) == [
         'map.csv:8: Item: 7, a Serve row has our own Station, which is 5 in the net file']
 
 
