@@ -74,7 +74,6 @@ def _set_scan_time(plc: SimulatedPlc, text: str) -> str:
     if value is None or not low <= value <= high:
         raise CommandError(
             f'scan {plc.station} {text}: "{text}" should be ms from {low} to {high}')
-    plc.advance()
     _ladder(plc).scan_time = value / 1000
     return f'station {plc.station}: scan {value}'
 

@@ -57,7 +57,7 @@ def path(tmp_path: Path) -> Path:
 
 def load(path: Path, clock: Clock, *rows: str) -> list[SimulatedPlc]:
     path.write_text('\n'.join([HEADER, *rows]), encoding='utf-8')
-    return load_plcs(str(path), Checksum.CRC, clock)
+    return load_plcs(str(path), Checksum.CRC, clock, MagicMock)
 
 
 def faults(path: Path, *rows: str) -> list[str]:
@@ -115,7 +115,7 @@ def test_data_file_fills_the_tables_of_its_plcs(path: Path, clock: Clock) -> Non
     one, two = load(path, clock, '1,PLC5,N7:0-2,3,1 -2 3,,', '1,PLC5,B3:0/4,3,1 0 1,,',
                     '1,PLC5,F8:1,1,1.5,,', '1,plc5,ST9:0,1,Hi,,', '2,SLC,L10:255,1,70000,,',
                     '2,MicroLogix,I:1.0,2,5,,')
-    assert (one.station, two.station) == (1, 2)
+    assert (one.station, two.station, one.lock is two.lock) == (1, 2, False)
     store(one, 'N7:1', [9])
     one.download()  # also without a ladder
     assert stored(one, 'N7:0', 3) == b'\1\0\xfe\xff\3\0'
@@ -172,10 +172,10 @@ def test_message_of_a_plc2_and_a_plc3_writes_its_value_and_tells_that_it_is_conf
     machine = simulated_plc(4, plc, clock, (text, 1))
     said: list[str] = []
     machine.send(parse_address(text, machine.table.plc_type), [7], 5, said.append)
-    machine.send(parse_address(text, machine.table.plc_type), [8], 5, said.append)
+    machine.send(parse_address(text, machine.table.plc_type), [8] * 200, 5, said.append)
     assert machine.next_task(0.0, {5}) is None
-    sending, last = machine.next_task(0.0), machine.next_task(0.0)
-    assert sending is not None and last is not None
+    sending, last, more = (machine.next_task(0.0) for _ in range(3))
+    assert sending is not None and last is not None and more is not None
     command = sending.command
     assert (command.cmd, command.dst, command.src) == (cmd, 5, 4)
     assert sending.answer_within == math.inf  # also for a station that was silent
@@ -183,7 +183,7 @@ def test_message_of_a_plc2_and_a_plc3_writes_its_value_and_tells_that_it_is_conf
     sending.reply(command.reply())
     last.reply(last.command.reply(sts=0x10))
     assert (said[0], len(said)) == ('confirmed', 2) and said[1].startswith('STS 10: ')
-    assert last.command.tns == command.tns + 1
+    assert (last.command.tns, more.command.tns) == (command.tns + 1, command.tns + 2)
 
 
 @for_all(('row', 'text'), [
@@ -215,7 +215,7 @@ def test_message_of_a_plc2_and_a_plc3_writes_its_value_and_tells_that_it_is_conf
     ('1,PLC5,B3:0/4,2,,Ramp,5', '2:6 (Motion): bits have no Ramp, only Toggle'),
 ])
 def test_fault_of_the_data_file(path: Path, row: str, text: str) -> None:
-    assert faults(path, row) == [text]
+    assert faults(path, row, row) == [text, f'3{text[1:]}']
 
 
 def test_ramp_counts_up_each_period_and_begins_again(path: Path, clock: Clock) -> None:
@@ -333,8 +333,10 @@ def test_noise_damages_its_share(plc: SimulatedPlc) -> None:
     damaged = [byte for byte in received if byte]
     assert 900 < len(damaged) < 1100
     assert set(damaged) == {1 << bit for bit in range(8)}
-    plc.faults = InjectedFaults(noise=1.0)
-    assert plc.damaged(frames.ACK) != frames.ACK
+    plc.faults = InjectedFaults(noise=1.0, slow=1)
+    master = Master(plc)
+    assert (master.deliver(READ) == frames.ACK, master.poll() == frames.EOT) == (False, False)
+    assert master.poll()[:1] not in (b'', frames.STX[:1])
 
 
 def test_plc_with_a_delay_replies_when_it_is_over(plc: SimulatedPlc, clock: Clock) -> None:
@@ -365,14 +367,14 @@ def _with_ladder() -> tuple[Clock, SimulatedPlc]:
 def test_program_stands_still_outside_of_run_but_tables_answer() -> None:
     clock, plc = _with_ladder()
     clock.now += 2.0
-    plc.set_mode(Setting.PROGRAM)
-    count = stored(plc, 'N11:3')
+    plc.advance()
+    count, words = stored(plc, 'N11:3'), copy.deepcopy(plc.table.words)
     assert (count, stored(plc, 'T13:0.PRE')) == (b'\x10\0', b'\x2c\1')  # with scans of 10 ms
     for setting in (Setting.PROGRAM, Setting.TEST, Setting.FAULT):
         plc.set_mode(setting)
         clock.now += 5.0
         plc.advance()
-        assert stored(plc, 'N11:3') == count
+        assert plc.table.words == words
     plc.set_mode(Setting.REMOTE)
     clock.now += 1.0
     plc.advance()
@@ -420,6 +422,7 @@ def test_plcs_behind_a_gateway_are_one_station_of_the_line(tmp_path: Path) -> No
     assert direct is plcs[2]
     for plc in plcs[:2]:
         identify = Packet(plc.station, 5, 0x06, 0, plc.station, b'\x03')
+        plc.set_mode(Setting.PROGRAM)  # in which it answers
         frame = Frame(identify.encode(), 10)
         assert direct.handle(frame) == other.handle(frame) == b''
         assert gateway.handle(frame) == frames.ACK
@@ -427,9 +430,10 @@ def test_plcs_behind_a_gateway_are_one_station_of_the_line(tmp_path: Path) -> No
         assert gateway.handle(Poll(10, True)) == frames.message_frame(reply.encode(), Checksum.BCC)
         gateway.handle(ACKNOWLEDGED)
     plcs[1].faults.silent = True
-    for dst, data, answer, sts in ((10, b'\0\7', b'\7', 0), (10, b'', b'', 0x10), (2, b'', b'', 2),
-                                   (4, b'', b'', 2)):  # itself, a silent PLC, one elsewhere
-        command = Packet(dst, 5, 0x06, 0, dst + len(data), data)
+    for tns, (dst, cmd, data, answer, sts) in enumerate((
+            (10, 6, b'\0\7', b'\7', 0), (10, 6, b'', b'', 0x10), (10, 15, b'\0\7', b'', 0x10),
+            (10, 15, b'\3', b'', 0x10), (2, 6, b'', b'', 2), (4, 6, b'', b'', 2))):
+        command = Packet(dst, 5, cmd, 0, tns, data)  # for itself, a silent PLC, one elsewhere
         gateway.handle(Frame(command.encode(), 10))
         assert gateway.handle(Poll(10, True)) == frames.message_frame(
             command.reply(answer, sts).encode(), Checksum.BCC)
@@ -444,6 +448,7 @@ def test_plcs_behind_a_gateway_are_one_station_of_the_line(tmp_path: Path) -> No
         ('1,PLC5,F8:0,,,,,11', 'station 1 is behind gateway 10 already'),
         ('1,PLC5,F8:0,,,,,', 'station 1 is behind gateway 10 already'),
         ('10,PLC5,F8:0,,,,,', 'station 10 is a PLC, it cannot be a gateway too'),
+        ('2,PLC5,F8:0,,,,,1', 'station 1 is a PLC, it cannot be a gateway too'),
         ('5,PLC5,F8:0,,,,,5', 'station 5 is a PLC, it cannot be a gateway too'),
         ('2,PLC5,F8:0,,,,,0', 'Via = "0" should be a whole number from 1 to 254')))])
 def test_rows_that_contradict_each_other(path: Path, first: str, second: str, text: str) -> None:
@@ -540,6 +545,10 @@ def test_fault_that_would_have_no_effect_is_refused(plcs: list[SimulatedPlc]) ->
             with pytest.raises(CommandError, match=f'{station} is behind a {place}, where'):
                 execute(line.format(station), plcs)
     assert plcs[0].faults == plcs[1].faults == InjectedFaults()
+    plcs[1].be_full_duplex()
+    with pytest.raises(CommandError, match='12 is on a full-duplex line, where "delay" has'):
+        execute('delay 12 50', plcs)
+    assert execute('full 12', plcs) == 'station 12: full'
 
 
 @pytest.mark.parametrize('line', ['hush 1', 'silent 3'])
@@ -589,7 +598,10 @@ def test_download_power_and_reset() -> None:
         execute('reset 1', [plc])
     plc.run_ladder(Ladder(plc.table))
     plc.lock = lock = MagicMock()
-    for verb in ('reset', 'power', 'download'):
+    plc.serve(Packet(1, 5, 0x06, 0, 1, STATUS_REQUEST))
+    assert lock.__enter__.call_count == 2  # for its program, and for the command
+    lock.reset_mock()
+    for verb in ('normal', 'reset', 'power', 'download'):
         assert execute(f'{verb} 1', [plc]) == f'station 1: {verb}'
         assert lock.__enter__.called  # the thread of the link may be in the program
     assert plc.processor.setting is Setting.PROGRAM
