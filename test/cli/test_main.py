@@ -32,7 +32,7 @@ from abdf1_ros.cli import main as commands
 from abdf1_ros.cli import terminal
 from abdf1_ros.cli.main import COMMANDS
 import pytest
-from support.cases import long_unless
+from support.cases import compare_stored, long_unless
 from support.commands import call, Output
 from support.ptys import PATIENCE
 
@@ -237,6 +237,4 @@ def test_all_that_commands_tell_is_as_stored(
         with ZipFile(path) as bundle:
             told += ''.join(f'{name}:\n{bundle.read(name).decode()}' for name in bundle.namelist()
                             if name != 'versions.json')
-    if 'UPDATE_STORED' in os.environ:
-        (stored / name / 'told.txt').write_text(told, 'utf-8')
-    assert told == (stored / name / 'told.txt').read_text('utf-8')
+    compare_stored(stored / name / 'told.txt', told)

@@ -16,6 +16,7 @@
 
 from collections.abc import Callable
 import os
+from pathlib import Path
 
 from abdf1_ros.conform import codec
 from abdf1_ros.conform.case import CaseResult, Target, Verdict
@@ -23,9 +24,10 @@ from abdf1_ros.conform.cases import CASES
 from abdf1_ros.conform.codec import BlockCheck, Symbol, SymbolKind
 from abdf1_ros.conform.data import changes_nothing
 from abdf1_ros.conform.ends import AskingEnd, MasterEnd, PeerEnd, SlaveEnd, Words
+from abdf1_ros.conform.report import line_of
 from abdf1_ros.conform.wire import Failed, Skipped, Wire
 import pytest
-from support.cases import for_all
+from support.cases import compare_stored, for_all
 from support.conformance import failures, results_of
 from support.conversations import Conversation, CONVERSATIONS, said_by_codec
 from support.mutated_ends import (
@@ -38,6 +40,7 @@ from support.mutated_ends import (
     MutatedSlave,
 )
 
+STORED = Path(__file__).with_name('stored')
 ENDS = {Target.SLAVE: MutatedSlave, Target.PEER: MutatedPeer, Target.MASTER: MutatedMaster,
         Target.CLIENT: MutatedClient, Target.RADIO: MutatedRadioNode,
         Target.RADIO_CLIENT: MutatedRadioClient}
@@ -195,27 +198,6 @@ FAULTS = [(target, habit, name) for targets, habit, name in [
     (SENDER, Habit.SENDS_ON_OWN, 'own-command-dropped'),
 ] for target in targets]
 
-# What is told of some of them: expected, and got.
-TOLD = {
-    (Target.SLAVE, Habit.NO_ACK): ('DLE ACK for a good message', 'silence'),
-    (Target.SLAVE, Habit.BAD_CHECK_OF_HIGH_BYTES): (
-        'a message or DLE EOT as answer to a poll', 'a message with a wrong check'),
-    (Target.PEER, Habit.BAD_CHECK_OF_HIGH_BYTES): ('the reply', 'a message with a wrong check'),
-    (Target.PEER, Habit.EXCHANGES_TNS): (
-        'a reply 05 01 46 STS 10 00 to this command', '05 01 46 00 00 10'),
-    (Target.SLAVE, Habit.DOES_ALL_FUNCTIONS): ('STS 10 or STS F0', 'STS 00'),
-    (Target.SLAVE, Habit.WORDS_REVERSED): ('01 80 in N7:2', '05 82'),
-    (Target.PEER, Habit.IGNORES_BAD_CHECK): ('DLE NAK', 'silence'),
-    (Target.PEER, Habit.NAK_AS_0F): ('DLE NAK', 'bytes outside of any symbol'),
-    (Target.PEER, Habit.ENQ_ALWAYS_NAK): ('DLE ACK', 'DLE NAK'),
-    (Target.PEER, Habit.EMBEDDED_NAK_IGNORED): (
-        'the reply again that was refused', 'DLE ACK, DLE ENQ'),
-    (Target.MASTER, Habit.TAKES_ANY_TNS): (
-        'no new command for 5.1 s, as after no reply', 'the next command after 0.05 s'),
-    (Target.MASTER, Habit.NAK_BEFORE_COMMAND): (
-        'no DLE NAK while all is answered', '4 beside 4 commands'),
-    (Target.CLIENT, Habit.SAME_TNS): ('three different TNS', '34 12, 34 12, 34 12')}
-
 # What the manual allows, or leaves to a setting, and the cases that cannot be judged then.
 ALLOWED = [(target, habit, names) for targets, habit, names in [
     (ALL, Habit.SLOW, set()),
@@ -254,19 +236,21 @@ def skipped(results: list[CaseResult]) -> set[str]:
     return {result.case.name for result in results if result.verdict is Verdict.SKIP}
 
 
-@for_all('fault', FAULTS)
-def test_fault_is_found_by_the_case_that_names_it(fault: tuple[Target, Habit, str]) -> None:
-    target, habit, name = fault
-    end = ENDS[target]('CRC', habit)
-    for words in end.files:
-        words[:] = b'\7' * len(words)
-    result, = results_of(end, target, 'CRC', only=name)
-    assert result.verdict is Verdict.FAIL
-    assert target in ASKING or result.transcript[0].startswith('      0.0 ms we ')
-    told = result.expected, result.got
-    assert told == TOLD.get((target, habit), told)
-    # the case has restored the words of the PLC
-    assert set().union(*end.files) <= {7}
+def test_faults_are_found_by_the_cases_that_name_them_and_told_as_stored() -> None:
+    told = []
+    for target, habit, name in FAULTS:
+        end = ENDS[target]('CRC', habit)
+        for words in end.files:
+            words[:] = b'\7' * len(words)
+        result, = results_of(end, target, 'CRC', only=name)
+        told.append(f'{target.value} {habit.name} {name}: {result.verdict.value} after '
+                    f'{result.seconds:.2f} s, {len(result.transcript)} symbols, expected '
+                    f'{result.expected}, got {result.got}\n')
+        assert result.verdict is Verdict.FAIL, told[-1]
+        assert target in ASKING or result.transcript[0].startswith('      0.0 ms we ')
+        # the case has restored the words of the PLC
+        assert set().union(*end.files) <= {7}, told[-1]
+    compare_stored(STORED / 'faults.txt', ''.join(told))
 
 
 @pytest.mark.parametrize('name, got, habits', [
@@ -310,9 +294,13 @@ def test_what_is_allowed_is_no_fault(first: int) -> None:
 
 
 @pytest.mark.parametrize('target', ENDS)
-def test_end_without_a_fault_passes_and_every_case_finds_one(target: Target) -> None:
+def test_end_without_a_fault_passes_as_stored_and_every_case_finds_one(target: Target) -> None:
     """A case that no fault can fail would be worth nothing."""
-    assert failures(results_of(ENDS[target]('CRC'), target, 'CRC')) == []
+    results = results_of(ENDS[target]('CRC'), target, 'CRC')
+    assert failures(results) == []
+    compare_stored(STORED / f'{target.value}.txt', ''.join(
+        f'{line_of(result)}\n{result.seconds:.2f} s, {len(result.transcript)} symbols\n'
+        + ''.join(f'{line}\n' for line in result.transcript[:30]) for result in results))
     cases = {case.name for case in CASES if target in case.targets}
     found = {name for whose, _, name in FAULTS if whose is target}
     # Two cases are tested below; 255 repetitions by radio take longer than a case may.
@@ -379,7 +367,7 @@ class Babble:
         self.sent += data
 
 
-@for_all(('target', 'habits', 'names'), [
+NOT_TRIED: list[tuple[Target, list[Habit] | None, str]] = [
     (Target.SLAVE, None, 'poll-idle bad-poll-ignored other-station-ignored crc-covers-station '
      'broadcast-unanswered full-is-silent bad-check-ignored short-message-ignored'),
     (Target.SLAVE, [Habit.NO_ACK, Habit.SENDS_COMMANDS], 'crc-covers-station full-is-silent '
@@ -391,13 +379,18 @@ class Babble:
     (Target.CLIENT, [Habit.NO_REPETITION], 'nak-limit'),
     (Target.CLIENT, [Habit.ACK_TIMEOUT_OF_8], 'enquiry-limit'),
     (Target.MASTER, [Habit.NO_REPETITION], 'repetitions-limited'),
-    (Target.RADIO_CLIENT, [Habit.SLOW], 'bad-reply-ignored other-reply-ignored')])
-def test_rule_is_not_tried_where_nothing_of_it_happens(
-        target: Target, habits: list[Habit] | None, names: str) -> None:
-    for name in names.split():
+    (Target.RADIO_CLIENT, [Habit.SLOW], 'bad-reply-ignored other-reply-ignored')]
+
+
+def test_rule_is_not_tried_where_nothing_of_it_happens_and_told_as_stored() -> None:
+    told = []
+    for target, habits, name in [(target, habits, name) for target, habits, names in NOT_TRIED
+                                 for name in names.split()]:
         line = Babble() if habits is None else ENDS[target]('CRC', *habits)
         result, = results_of(line, target, 'CRC', only=name)
-        assert result.verdict is Verdict.SKIP, name
+        told.append(f'{target.value} {name}: {result.got}, {len(result.transcript)} symbols\n')
+        assert result.verdict is Verdict.SKIP, told[-1]
+    compare_stored(STORED / 'not_tried.txt', ''.join(told))
 
 
 class TwoMasters:

@@ -228,28 +228,12 @@ def test_guests_are_part_of_the_load() -> None:
         'longer')
 
 
-def test_our_own_station_is_mapped() -> None:
-    mapping = make_mapping('N7:0', station=5, tag='speed')
-    assert report_of(mapping).remarks() == [Remark(RemarkKind.STATION, (
-        'station 5 of speed is our own Station in the net file; '
-        'a PLC may refuse commands from its own number'), 5)]
-    assert texts(report_of(mapping, station=6), RemarkKind.STATION) == []
-
-
 def test_served_words_and_broadcasts_clash_with_nothing() -> None:
     report = report_of(make_mapping('N7:0', 'Serve', station=5),
                        make_mapping('N7:0', 'Write', station=255, plc='SLC', item=2),
                        make_mapping('N7:0', 'Write', station=255, item=3))
     assert report.blocks == ()
     assert report.remarks() == []
-
-
-def test_two_plc_types_at_one_station() -> None:
-    report = report_of(make_mapping('N7:0', tag='a'), make_mapping('F8:0', 'Write', tag='b'),
-                       make_mapping('B3:0', plc='SLC', tag='c', item=2),
-                       make_mapping('020', plc='PLC2', access='CIF', item=3))  # of the SLC
-    assert texts(report, RemarkKind.STATION) == [
-        'station 1 has more than one PLC_Type: PLC5 (a, b), SLC (c)']
 
 
 def test_file_of_a_plc_has_one_type() -> None:
@@ -297,12 +281,6 @@ def test_members_of_structures_apart_are_compared_with_whole_elements() -> None:
     assert text == (
         'station 1, T4:0.ACC to T4:200.ACC: 2 reads with 0 words that no tag needs take 146.2 ms; '
         'side by side in the PLC the tags would take 82.5 ms')
-
-
-def test_many_tags_are_not_all_named() -> None:
-    report = report_of(*(make_mapping(f'N7:{number}', period=20, tag=f't{number}', item=number)
-                         for number in range(5)))
-    assert texts(report, RemarkKind.PERIOD)[0].startswith('t0, t1, t2 and 2 more: a read takes')
 
 
 def test_rule_20_what_nothing_protects_is_one_note() -> None:
@@ -395,14 +373,6 @@ def test_words_with_write_again_have_to_be_read_often(
     rows.append(make_mapping('N9:0', period=100))  # of other words
     found = texts(report_of(*rows[::-1]), RemarkKind.SETTING)
     assert [expected in text for text in found] == [True] * bool(expected)
-
-
-def test_rows_on_demand_are_a_note_and_no_load() -> None:
-    report = report_of(make_mapping('N7:0', tag='recipe', length=100, is_on_demand=True),
-                       make_mapping('N9:0', tag='speed'))
-    assert [block.mappings[0].tag for block in report.blocks] == ['speed']
-    note, = [note for note in report.notes() if 'on demand' in note]
-    assert note.startswith('read on demand alone, by ~/read_now: recipe (')
 
 
 # Forecasts of poll cycle and load, before anything is connected

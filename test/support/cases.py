@@ -18,6 +18,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 import functools
 import inspect
 import itertools
+import os
+from pathlib import Path
 from typing import Any, TypeVar
 
 from _pytest.mark import ParameterSet
@@ -70,6 +72,13 @@ def long_unless(is_quick: Callable[..., bool], cases: Iterable[tuple[Any, ...]],
     """Return cases for ``parametrize``; "make test" leaves out those that are not quick."""
     return [pytest.param(*case, marks=() if is_quick(*case) else pytest.mark.long)
             for case in cases]
+
+
+def compare_stored(path: Path, text: str) -> None:
+    """Compare a text with a stored one; with UPDATE_STORED in the environment, store it before."""
+    if 'UPDATE_STORED' in os.environ:
+        path.write_text(text, 'utf-8')
+    assert text == path.read_text('utf-8')
 
 
 def _shown(case: dict[str, Any]) -> str:
