@@ -428,12 +428,14 @@ def test_periods_are_longer_by_the_load_of_the_line_but_by_no_more_than_a_scan()
     assert found == {1.0: pytest.approx(1.0 + time + 0.5)}
 
 
-@for_all(('count', 'between'), [(0, 0.5), (1, 0.6), (2, 0.9), (9, 1.2)])
+@for_all(('count', 'between'), [(0, 0.5), (1, 0.6), (2, 0.9), (9, 1.8)])
 def test_stale_time_has_room_for_one_own_command_after_each_read(
         count: int, between: float) -> None:
-    blocks = Planner(line_model(NETWORK), 0.25).plan([make_mapping('N7:0'), make_mapping('N9:0')])
+    blocks = Planner(line_model(Network(baud=115200)), 0.25).plan([
+        make_mapping('N7:0'), make_mapping('N9:0', length=120)])  # three reads
     found = stale_times(blocks, 0.25, 3.0, [(0.6, 100.0), *[(0.3, 100.0)] * 8][:count])
-    assert [*found.values()] == 2 * [pytest.approx(0.25 + between + block_time(blocks[0]))]
+    assert [*found.values()] == 2 * [pytest.approx(
+        0.25 + between + max(blocks[1].line_times) + ANSWERS)]
 
 
 def test_reads_without_a_period_are_expected_to_have_what_is_left() -> None:
