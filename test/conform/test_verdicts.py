@@ -283,14 +283,18 @@ def test_word_after_those_of_the_user_is_not_judged() -> None:
                                words=Words(7, 2, 1, 'SLC'))) == []
 
 
-@pytest.mark.long
-@pytest.mark.parametrize('first', [0, 1])
-def test_what_is_allowed_is_no_fault(first: int) -> None:
+@pytest.mark.parametrize('first', [0, pytest.param(1, marks=pytest.mark.long)])
+def test_what_is_allowed_is_no_fault_and_told_as_stored(first: int) -> None:
+    told = []
     for number, (target, habit, names) in enumerate(ALLOWED, first):
         check = ('CRC', 'BCC')[number % 2]
         results = results_of(ENDS[target](check, habit), target, check)
         assert failures(results) == [], (target, habit, check)
         assert skipped(results) - NOT_HERE - SETTINGS == names
+        told += [f'{target.value} {habit.name} {result.case.name}: {result.verdict.value} after '
+                 f'{result.seconds:.2f} s, {len(result.transcript)} symbols\n'
+                 for result in results]
+    compare_stored(STORED / f'allowed_{first}.txt', ''.join(told))
 
 
 @pytest.mark.parametrize('target', ENDS)
