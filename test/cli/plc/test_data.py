@@ -74,9 +74,10 @@ def test_faults_name_the_argument(address: str, cells: dict[str, str], text: str
 def test_word_pairs_of_a_function_file_are_whole_numbers() -> None:
     cells = {'Command': 'Read', 'Station': '1', 'PLC_Type': 'SLC'}
     assert [(str(part.address), part.type.value, part.length)
-            for part in data.mappings_of('HSC:0', cells)] == [
+            for address in ('HSC:0', 'T4:0.PRE-T4:0.ACC', 'T4:0/13-15')
+            for part in data.mappings_of(address, cells)] == [
         ('HSC:0', 'int16', 2), ('HSC:0.MOD', 'int16', 1), ('HSC:0.ACC', 'int32', 5),
-        ('HSC:0.OMB', 'int16', 3)]
+        ('HSC:0.OMB', 'int16', 3), ('T4:0.PRE', 'int16', 2), ('T4:0/DN', 'bool', 3)]
 
 
 @for_all(('address', 'kind', 'number', 'expected'), [
@@ -95,6 +96,8 @@ def test_rows_of_values() -> None:
     words = data.rows(make('N7:0', Length='2'), array('h', [5, 0]), 'ab', data.Radix.BINARY)
     assert [*words] == [('a', '0000000000000101  /0 /2'), ('b', f'{"0" * 16}       ')]
     assert list(data.rows(make('F8:0'), array('f', [0.1]), ['F8:0'])) == [('F8:0', '0.1')]
+    scaled = replace(make('T4:1', Length='2', Command='Read'), scaling=Scaling(0.5, 0))
+    assert [*data.rows(scaled, [8192, 60], 'ab')] == [('a', '8192    60')]
     assert list(data.rows(make('ST9:0'), 'a\nb', ['ST9:0'])) == [('ST9:0', r"'a\nb'")]
 
 
