@@ -151,7 +151,7 @@ def _leave_out(result: Import, path: str, record: Record, tag: str, text: str) -
 def _rows(cells: Cells, wanted: Wanted) -> Iterator[Cells]:
     """Yield the row for each station."""
     for station in wanted.stations:
-        head = f'station_{station}/' if len(wanted.stations) > 1 else ''
+        head = f'station_{station}/' if 'Tag' in cells and len(wanted.stations) > 1 else ''
         yield {**cells, 'Tag': head + cells.get('Tag', ''), 'Station': str(station)}
 
 
