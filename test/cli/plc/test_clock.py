@@ -115,6 +115,9 @@ def test_drift_counts_from_the_middle_of_the_read(monkeypatch: pytest.MonkeyPatc
     (('3',), 1, 'station 3: is a PLC-2, whose clock is not known\n'),
     (('4', '--set', '--yes'), 1,
      'S2:37 of station 4: not written: the PLC refused it: STS 50: address not there'),
+    (('3', '--set', '--yes', '--plc-type', 'SLC'), 1, 'S2:37 of station 3: not written: the PLC '
+     'refused it: STS 10: illegal command, format or length, or the file does not exist\n'
+     'plc: station 3 is PLC-2 at 1771-KG series A'),
     (('--set', '--yes'), 2, '--station: give the station to write to: ')])
 def test_clock_that_cannot_be_had_is_told(
         port: str, capsys: Output, args: tuple[str, ...], status: int, text: str) -> None:

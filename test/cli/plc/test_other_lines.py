@@ -57,12 +57,13 @@ def test_write_and_read_in_full_duplex(peer: str, capsys: Output) -> None:
 
 def test_init_does_not_call_a_full_duplex_port_0_that_answers_to_all(
         peer: str, tmp_path: Path, capsys: Output) -> None:
-    said = call(main, capsys, 'init', '--port', peer, '--into', str(tmp_path), *FULL_DUPLEX)
+    said = call(main, capsys, 'init', '--port', peer, '--into', str(tmp_path), '--peer', *PATIENT)
     assert said.status == 0 and 'watch S:0 --station 1 --net' in said.out
     found = examine(str(tmp_path / 'net.csv'), str(tmp_path / 'map.csv'))
     assert found.problems == [] and found.network is not None
     assert [mapping.station for mapping in found.mappings] == [1]
     assert make_report(found.network, found.mappings, 0.1).remarks() == []
+    assert '\n# n7_1,Read,N7:0,' in (tmp_path / 'map.csv').read_text('utf-8')  # its own list
 
 
 def test_scan_in_full_duplex_tells_what_it_cannot_know(peer: str, capsys: Output) -> None:
