@@ -197,6 +197,7 @@ def test_commands_work_over_a_tcp_connection(files: Files, capsys: Output) -> No
         said = call(main, capsys, 'detect', '--port', url, '--parity', 'Even', '--stations',
                     '1', *PATIENT)
     assert said.lines[1].endswith(f'--port {url} --baud 9600 --check CRC --parity Even')
+    assert said.lines[-1] == f'5,Master,CRC,{url},9600,Even,300'
 
 
 def test_signal_ends_it(tmp_path: Path) -> None:

@@ -29,6 +29,7 @@ from abdf1_ros.cli import check
 from abdf1_ros.cli.overhearing import map_of, texts_of
 from abdf1_ros.cli.plc import detect, line, overhear
 from abdf1_ros.cli.plc.command import main
+from abdf1_ros.cli.plc.init import listening_csv
 from abdf1_ros.cli.plc.verbs import init
 from abdf1_ros.cli.terminal import called
 from abdf1_ros.df1.checksum import Checksum
@@ -245,6 +246,7 @@ def test_reads_of_a_full_duplex_line_are_heard_on_two_ports(
     monkeypatch.setattr(overhear, 'opened', lambda network: lambda: SimpleNamespace(
         read=lambda wait, wake: heard.pop(0) if heard else b'', close=lambda: None))
     network = Network(mode='Listen', com_port='/dev/a', listen_port='/dev/b')
+    assert listening_csv(network).endswith('\nListen,CRC,/dev/a,/dev/b,9600,None\n')
     assert [read.text for read in overhear.heard_reads(network, 0.05)] == [
         'protected typed logical read N7:0, 2 words']
 

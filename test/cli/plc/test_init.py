@@ -49,7 +49,7 @@ from support.ptys import no_file_longer_than
 
 PATIENT = ('--timeout', '2000', '--duplex', 'half')  # ms; a busy host may be late
 
-PLC5 = (('O:000', 2), ('S:0', 32), ('B3:0', 5), ('T4:0', 30), ('N7:0', 256), ('F8:0', 20),
+PLC5 = (('O:000', 2), ('S:0', 32), ('B3:0', 5), ('T4:0', 120), ('N7:0', 256), ('F8:0', 20),
         ('ST9:0', 84), ('A12:0', 7), ('D13:0', 2000), ('C20:0', 3), ('B40:0', 3))
 SLC = (('I:3.0', 2), ('S:0', 64), ('B3:0', 1), ('N7:0', 100), ('F10:0', 8), ('L40:0', 4))
 
@@ -218,7 +218,7 @@ def test_init_that_finds_nothing_leaves_no_folder(tmp_path: Path, capsys: Output
 
 
 @pytest.mark.parametrize(('station', 'found'), [
-    ('1', 'O0 by rack or slot, S2 32, B3 5, T4 10, N7 256, F8 10, ST9 2, A12 7, D13 2000, C20 1, '
+    ('1', 'O0 by rack or slot, S2 32, B3 5, T4 40, N7 256, F8 10, ST9 2, A12 7, D13 2000, C20 1, '
      'N40 3'),
     ('2', 'I1 2 words, S2 64, B3 1, N7 100, F10 4, L40 2')])
 def test_files_are_found_with_type_and_length(
@@ -229,10 +229,10 @@ def test_files_are_found_with_type_and_length(
 
 
 @pytest.mark.parametrize(('station', 'rows', 'comments'), [
-    ('1', 's2 S2:0 32, b3 B3:0 5, t4 T4:0 30, n7 N7:0 110, f8 F8:0 10, st9 ST9:0 1, a12 A12:0 7, '
+    ('1', 's2 S2:0 32, b3 B3:0 5, t4 T4:0 69, n7 N7:0 110, f8 F8:0 10, st9 ST9:0 1, a12 A12:0 7, '
      'd13 D13:0 110', ['O0: addressed by rack or slot', *(
          f'{name} elements; this row of one packet reads {count}' for name, count in (
-             ('N7 has 256', 110), ('ST9 has 2', 1), ('D13 has 2000', 110)))]),
+             ('T4 has 40', 23), ('N7 has 256', 110), ('ST9 has 2', 1), ('D13 has 2000', 110)))]),
     ('2', 's2 S2:0 64, b3 B3:0 1, n7 N7:0 100, f10 F10:0 4', ['I1: addressed by rack or slot'])])
 def test_files_become_rows_of_a_map(port: str, station: str, rows: str, comments: list[str],
                                     tmp_path: Path, capsys: Output) -> None:

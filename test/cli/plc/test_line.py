@@ -54,9 +54,10 @@ def test_every_option_sets_its_field_of_the_network() -> None:
 def test_peer_is_full_duplex_and_by_radio_a_timeout_is_for_the_reply() -> None:
     assert line_of('--port', '1', '--peer') == line_of('--port', '1', '--duplex', 'full')
     radio = [line_of('--port', '1', '--radio', *timeout) for timeout in ((), ('--timeout', '150'))]
-    radio.append(network_of(parse('init', '--port', '1', '--radio'), timeout='200'))
+    radio += [network_of(parse('init', '--port', '1', '--radio', *timeout), timeout='200')
+              for timeout in ((), ('--timeout', '90'))]
     assert [(line.timeout, line.cmd_timeout) for line in radio] == [
-        (300, Network().cmd_timeout), (150, 150), (200, Network().cmd_timeout)]
+        (300, Network().cmd_timeout), (150, 150), (200, Network().cmd_timeout), (90, 90)]
 
 
 def test_gateway_has_an_address_in_half_duplex_that_is_not_ours() -> None:

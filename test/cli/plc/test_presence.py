@@ -20,6 +20,7 @@ import threading
 import time
 from types import SimpleNamespace
 from typing import cast
+from unittest.mock import Mock
 
 from abdf1_ros.cli.plc import presence
 from abdf1_ros.cli.plc.command import main
@@ -35,7 +36,7 @@ from abdf1_ros.cli.plc.presence import (
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.errors import FormatError, StationInactive
+from abdf1_ros.errors import FormatError, RemoteError, StationInactive
 from abdf1_ros.pccc.identity import Identity, Mode
 from abdf1_ros.ports.descriptor import PortAround
 from abdf1_ros.settings.network import Network
@@ -69,6 +70,12 @@ def test_everything_a_station_has_said() -> None:
 def test_next_step_for_a_plc_of_an_unknown_family_names_one(
         identity: Identity | None, option: str) -> None:
     assert type_to_say(Presence(2, 0.1, identity, None, True, True)) == option
+
+
+def test_refusal_of_an_echo_proves_a_station_and_other_bytes_do_not() -> None:
+    errors = None, RemoteError(0x10, None, ''), FormatError('')
+    session = cast(Session, SimpleNamespace(attempt=Mock(side_effect=[(None, e) for e in errors])))
+    assert [presence.understands(session, 1) for _ in errors] == [True, True, False]
 
 
 @pytest.mark.parametrize(('slot', 'ways'), [(0, ['Slot', 'Flat']), (7, ['Slot', 'Flat']),
