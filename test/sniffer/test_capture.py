@@ -17,6 +17,7 @@
 import os
 from pathlib import Path
 import stat
+from types import MappingProxyType
 
 from abdf1_ros.problems import Problem
 from abdf1_ros.sniffer import capture
@@ -25,13 +26,13 @@ from support.cases import for_all
 
 CHUNKS = [capture.Chunk(0.0, capture.Direction.OUT, b'\x10\x05\x01\xff'),
           capture.Chunk(0.00421, capture.Direction.IN, b'\x10\x04'),
-          capture.Chunk(3600.5, capture.Direction.UNKNOWN, b'\x00')]
+          capture.Chunk(1772000000.5, capture.Direction.UNKNOWN, b'\x00')]
 TEXT = """\
 # abdf1_ros capture 1
 # baud: 19200
 0.000000 > 10 05 01 FF
 0.004210 < 10 04
-3600.500000 ? 00
+1772000000.500000 ? 00
 """
 
 
@@ -71,7 +72,7 @@ def test_blank_lines_remarks_and_a_second_head_may_stand_anywhere() -> None:
 
 def test_it_never_takes_more_than_the_limit(tmp_path: Path) -> None:
     path, old = tmp_path / 'x', tmp_path / 'x.1'
-    writer = capture.CaptureWriter(path, 992, {'baud': '1200'})  # a line fills it
+    writer = capture.CaptureWriter(path, 992, MappingProxyType({'baud': '1200'}))
     writer.write({'baud': '9600'})
     for count in range(200):
         writer.write(capture.Chunk(count / 10, capture.Direction.IN, bytes((count,))))
@@ -88,26 +89,27 @@ def test_it_never_takes_more_than_the_limit(tmp_path: Path) -> None:
 
 def test_the_limit_counts_escapes(tmp_path: Path) -> None:
     path, old = tmp_path / 'x', tmp_path / 'x.1'
-    writer = capture.CaptureWriter(path, 1000, {'port': '/dev/s\xe9rie' + 40 * '\xe9'})
+    writer = capture.CaptureWriter(path, 1000, {'port': '/dev/s' + 41 * '\xe9'})
     for count in range(50):
         writer.write(capture.Chunk(count / 10, capture.Direction.IN, b'\x10\x04'))
     writer.close()
     assert max(path.stat().st_size, old.stat().st_size) <= 500
+    assert lines_of(path)[1] == r'# port: /dev/s' + 41 * r'\xe9'
 
 
 def test_older_capture_is_put_aside(tmp_path: Path) -> None:
-    path = tmp_path / 'x'
+    path = tmp_path / 'x.1'
     for chunk in CHUNKS:
         writer = capture.CaptureWriter(path)
         with pytest.raises(OSError, match='is being written by another; give another name'):
-            capture.CaptureWriter(path)  # such as that of another line of this process
+            capture.CaptureWriter(tmp_path / 'x')  # such as that of another line
         writer.write(chunk)
         writer.close()
     assert chunks_of(path) == CHUNKS[2:]
-    assert chunks_of(tmp_path / 'x.1') == CHUNKS[1:2]
+    assert chunks_of(tmp_path / 'x.1.1') == CHUNKS[1:2]
     path.unlink()
     capture.CaptureWriter(path).close()
-    assert chunks_of(tmp_path / 'x.1') == CHUNKS[1:2]
+    assert chunks_of(tmp_path / 'x.1.1') == CHUNKS[1:2]
 
 
 def test_others_cannot_read_a_capture(tmp_path: Path) -> None:
@@ -156,7 +158,7 @@ def test_other_version_is_refused() -> None:
 
 def test_only_the_beginning_of_a_long_line_is_shown() -> None:
     for lines in (['# abdf1_ros capture' + 'x' * 500], [TEXT.splitlines()[0], 'x' * 500],
-                  *([TEXT.splitlines()[0], f'{sign}{"9" * 300} > 10'] for sign in ('', '-'))):
+                  *([TEXT.splitlines()[0], f'{sign}{10 ** 10:0300} > 10'] for sign in ('', '-'))):
         with pytest.raises(Problem) as caught:
             list(capture.read_capture('a.cap', lines, {}))
         assert len(str(caught.value)) < 200

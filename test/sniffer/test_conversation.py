@@ -99,7 +99,7 @@ def test_program_that_never_changes_its_tns(talk: Talk) -> None:
         marks = (Mark.DUPLICATE,) if count else ()
         assert talk.out(COMMAND) == MessageFacts(marks=marks)
         talk.acknowledge(Direction.IN)
-        assert talk.back(REPLY) == MessageFacts(COMMAND, 0.5, marks)
+        assert talk.take(REPLY, talk.now, Direction.IN, False) == MessageFacts(COMMAND, 0.0, marks)
         talk.acknowledge(Direction.OUT)
 
 
@@ -167,5 +167,6 @@ def test_packet_that_was_sent_again_is_remembered_from_then_on() -> None:
     assert copies.mark(again._replace(tns=314), -20.0, Direction.IN) is None  # another recording
     assert copies.mark(again._replace(tns=314), None, Direction.IN) is Mark.RETRANSMISSION
     copies = Copies()  # of a node that repeats its own message soon
-    assert [copies.mark(again, time, Direction.OUT) for time in (0.0, 0.5)] == [
-        None, Mark.RETRANSMISSION]
+    assert [copies.mark(again, time, way) for time, way in (
+        (0.0, Direction.OUT), (0.5, Direction.OUT), (9.0, Direction.IN))] == [
+            None, Mark.RETRANSMISSION, Mark.FORWARDED]

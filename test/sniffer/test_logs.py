@@ -61,7 +61,7 @@ def hexdump(data: bytes) -> list[str]:
 
 
 @for_all('text', [
-    '10 05 01 FF', '100501ff', '1005 01ff', '0x10, 0x05, 0x01, 0xFF', '10,05,01,FF',
+    '10 05 01 FF', '100501ff', '1005 01ff', '0x10, 0x05, 0x01, 0xFF', '000000: 10,05,01,FF',
     '  10 05 01 FF  ', '# a poll\n10 05\n\n01 FF\n', '2024-05-01T10:00:00.120 10 05 01 FF'])
 def test_bytes_alone_are_read_in_any_notation(text: str) -> None:
     assert joined(text.splitlines()) == b'\x10\x05\x01\xff'
@@ -81,7 +81,8 @@ def test_lines_left_out_by_hexdump() -> None:
     assert '*' in hexdump(data)
     assert joined(hexdump(data)) == data
     assert joined(['00000000']) == bytes(4)  # there is no offset without bytes before it
-    assert joined([*xxd(b'\x10\x05'), '0601ff10']) == bytes.fromhex('1005 0601ff10')
+    assert joined([*xxd(b'\x10\x05'), '*', '00000006: 0601', '0601ff10']) == bytes.fromhex(
+        '1005 1005 1005 0601 0601ff10')
     data = bytes(160)  # the last line is whole, so the offset alone ends the repetition
     assert hexdump(data)[1:] == ['*', '000000a0']
     assert joined(2 * hexdump(data)) == 2 * data
@@ -112,11 +113,11 @@ def chunks(path: Path, content: bytes, is_binary: bool = False) -> list[Chunk]:
 def test_kinds_of_files_are_told_apart(tmp_path: Path) -> None:
     path = tmp_path / 'x'
     poll = Chunk(None, Direction.UNKNOWN, b'\x10\x05\x01\xff')
-    assert chunks(path, b'10 05 01 FF\r\n') == [poll]
+    assert chunks(path, b'100501FF\r\n') == [poll]
     assert chunks(path, b'# abdf1_ros capture 1\r\n0.5 > 10 05 01 FF\r\n') == [
         Chunk(0.5, Direction.OUT, poll.data)]
     assert chunks(path, b'\x1f\x8b', True)[0].data == b'\x1f\x8b'  # though gzip begins so
-    assert chunks(path, b'0000000 0510 ff01\n0000004\n') == [poll]
+    assert chunks(path, b' 0000000 0510 ff01\n0000004\n') == [poll]
     assert chunks(path, b'') == []
     with pytest.raises(Problem, match='x:2: this is not text; for a file of raw bytes give --bin'):
         chunks(path, b'10 05\n\xe9\n')
@@ -317,7 +318,7 @@ def test_words_whose_offsets_do_not_fit_are_refused(lines: list[str], text: str)
 @for_all('line', [
     'TX 02 10 06',  # a count and two bytes, or three bytes
     'TX 10 06    ABCD', 'TX  41 42 43  A-C', 'TX: 10 0', 'TX 10 06 and more', 'COM1, opened',
-    'TX: 10:06', 'RX 1006 1', 'port 10 06',
+    'TX: 10:06', 'RX 1006 1', 'port 10 06', '10 5 TX', 'TX  10 06  XY',
     # what would be left over
     '12:00:01.000 TX 10 05 01 FF RX 10 04', 'TX 10 05 01 FF BCC 0A', 'TX: 10 05 01 FF len: 04',
     'TX10 05 01 FF', 'TX100501FF', '>10 05 01', 'TX 10 5 01 FF', 'RX 10 0 04', 'TX 5 tx FF',
@@ -334,8 +335,8 @@ def test_characters_that_look_like_bytes_staycharacters() -> None:
                  f'TX   0000  {data.hex(" ")}   {characters(data)}'):
         chunk, = read(iter([line]))
         assert (chunk.data, chunk.direction) == (data, OUT)
-    assert [chunk.data for chunk in read(iter(['TX  41 10 43  A_C', 'TX  41 10 20  A_']))] == [
-        b'A\x10C', b'A\x10 ']
+    lines = 'TX  41 10 20 7F 43 44  A___C.', 'TX  34 31 20 2B  41 +', 'TX  41 10 20  A_'
+    assert [chunk.data for chunk in read(iter(lines))] == [b'A\x10 \x7fCD', b'41 +', b'A\x10 ']
 
 
 @for_all('line', [
@@ -347,20 +348,20 @@ def test_counts_labels_and_words_are_not_left_over_bytes(line: str) -> None:
 
 
 def test_time_of_day_goes_on_after_midnight() -> None:
-    times = ['00:00:00', '23:59:59.900', '00:00:00.100', '00:00:01,100', '20:00:00.000',
+    times = ['23:59:59.900', '00:00:00.100', '00:00:01,100', '00:00:00.600', '20:00:00.000',
              '00:00:00.100']
     chunks = read(iter(f'{time} TX: 10 05' for time in times))
     assert [chunk.time for chunk in chunks] == pytest.approx(
-        [0.0, 86399.9, 86400.1, 86401.1, 158400.0, 172800.1])
-    chunks = read(iter(f'{time} TX: 10 05' for time in ('1732700000123456.000', '0.500', '0.750')))
+        [0.0, 0.2, 1.2, 0.7, 72000.1, 86400.2])
+    chunks = read(iter(f'{time} TX: 10 05' for time in ('1732700000123456.000', '0.000', '0.250')))
     assert [chunk.time for chunk in chunks][1:] == [0.0, 0.25]  # the clock began again
 
 
 def test_direction_holds_for_lines_without_one_until_the_next() -> None:
-    lines = ['TX 1.250 10 02', '01 02', 'RX 23:59:59 10 06', '[00:00:01] 10 15',
+    lines = ['TX 1.250 10 02', '01 02', 'RX 23:59:59 10 06', '[00:00:01] 01 15',
              'uint8_t tx[] = { 0x10, 0x04 };']
     assert [(chunk.direction, chunk.data.hex()) for chunk in read(iter(lines))] == [
-        (OUT, '1002'), (OUT, '0102'), (IN, '1006'), (IN, '1015'), (OUT, '1004')]
+        (OUT, '1002'), (OUT, '0102'), (IN, '1006'), (IN, '0115'), (OUT, '1004')]
 
 
 @for_all('line', [

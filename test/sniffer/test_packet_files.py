@@ -66,13 +66,15 @@ def encapsulated(data: bytes, is_connected: bool = False) -> bytes:
 
 def tcp(payload: bytes, number: int, to_plc: bool = True, flags: int = 0x18,
         net: int = 0) -> bytes:
-    """Return a segment in IP, without options."""
+    """Return a segment in IP; those to the PLC have options in both heads."""
     hosts = bytes((192, 168, 0, 65)), bytes((192, 168, net, 30))
     ports = 50000, 44818
     ways = (hosts, ports) if to_plc else (hosts[::-1], ports[::-1])
-    segment = struct.pack('>HHIIBBHHH', *ways[1], number & 0xFFFFFFFF, 0, 0x50, flags, 0, 0, 0)
-    return (struct.pack('>BBHIBBH', 0x45, 0, 40 + len(payload), 0x4000, 64, 6, 0)
-            + b''.join(ways[0]) + segment + payload)
+    segment = struct.pack('>HHIIBBHHH', *ways[1], number & 0xFFFFFFFF, 0, 0x50 + 0x30 * to_plc,
+                          flags, 0, 0, 0) + 12 * to_plc * b'\1'
+    size = 40 + 16 * to_plc + len(payload)
+    return (struct.pack('>BBHIBBH', 0x45 + to_plc, 0, size, 0x4000, 64, 6, 0)
+            + b''.join(ways[0]) + 4 * to_plc * b'\1' + segment + payload)
 
 
 def ethernet(ip: bytes, vlan: bool = False) -> bytes:
@@ -84,7 +86,7 @@ def pcap(packets: Sequence[tuple[float, bytes]], link_type: int = ETHERNET, orde
          magic: int = 0xA1B2C3D4) -> bytes:
     ticks = 10 ** (9 if magic == 0xA1B23C4D else 6)
     return struct.pack(f'{order}IHHIIII', magic, 2, 4, 0, 0, 65535, link_type) + b''.join(
-        struct.pack(f'{order}IIII', int(time), round(time % 1 * ticks), len(data), len(data))
+        struct.pack(f'{order}IIII', int(time), round(time % 1 * ticks), len(data), len(data) + 9)
         + data for time, data in packets)
 
 
@@ -104,7 +106,7 @@ def pcapng(packets: Sequence[tuple[float, bytes]], order: str, options: bytes, t
         block(order, 5, bytes(20)),  # statistics
         *(block(order, 6, struct.pack(
             f'{order}5I', others, round(time * ticks) >> 32, round(time * ticks) & 0xFFFFFFFF,
-            len(data), len(data)) + data) for time, data in packets)))
+            len(data), len(data) + 9) + data) for time, data in packets)))
 
 
 def chunks_of(path: Path, content: bytes) -> list[Chunk]:
@@ -155,10 +157,12 @@ def test_packets_that_the_recorder_has_cut_are_told_and_others_read(tmp_path: Pa
 
 @pytest.mark.parametrize('data', [
     encapsulated(cip(STATUS), is_connected=True), encapsulated(sent_through(cip(STATUS))),
-    encapsulated(sent_through(cip(STATUS), 2000))])
+    encapsulated(sent_through(cip(STATUS), 2000)),
+    encapsulated(bytes.fromhex('4B 03 21 00 67 00 24 01 03 4D 00') + STATUS)])
 def test_pccc_comes_connected_and_through_a_backplane(tmp_path: Path, data: bytes) -> None:
-    chunk, = chunks_of(tmp_path / 'x', pcap([(0.0, ethernet(tcp(data, 1), vlan=True))]))
-    assert chunk == Chunk(0.0, Direction.OUT, bytes((30, 65)) + STATUS, is_message=True)
+    chunk, = chunks_of(tmp_path / 'x', pcap([(0.0, ethernet(tcp(data, 1).replace(
+        b'\xA8\0\x41', b'\xA8\1\x1E'), vlan=True))]))  # from 192.168.1.30 to 192.168.0.30
+    assert chunk == Chunk(0.0, Direction.OUT, bytes((30, 254)) + STATUS, is_message=True)
 
 
 @pytest.mark.parametrize(('link_type', 'head'), [
@@ -173,7 +177,7 @@ def test_segments_are_put_together_and_those_that_come_again_are_dropped(tmp_pat
     data = encapsulated(cip(STATUS))
     again = encapsulated(cip(STATUS[:2] + b'\1\0' + STATUS[4:]))
     parts = [(b'', -1, 0x02), (data[:10], 0, 0x18), (data[:10], 0, 0x18), (data[5:30], 5, 0x18),
-             (data[30:] + again + 30 * b'\2', 30, 0x18),
+             (data[30:] + again + 30 * b'\2', 30, 0x18), (data, 0, 0x18),
              (b'lost before this', 9999, 0x18), (data, 20000, 0x18),
              (data[:40], 21000, 0x18), (data[40:], 21040, 0x18),  # what is complete at its end
              (b'', 4999, 0x02), (data, 5000, 0x18)]  # the same ports in a later connection
@@ -181,12 +185,13 @@ def test_segments_are_put_together_and_those_that_come_again_are_dropped(tmp_pat
                for at, (part, number, flags) in enumerate(parts)]
     found = chunks_of(tmp_path / 'x', pcap(packets))
     assert [(chunk.time, chunk.data[4:6].hex()) for chunk in found] == [
-        (4.0, '63c5'), (4.0, '0100'), (6.0, '63c5'), (9.0, '63c5'),
-        (10.0, '63c5')]
-    halves = [(0.0, ethernet(tcp(data, 0))), *(
+        (4.0, '63c5'), (4.0, '0100'), (7.0, '63c5'), (10.0, '63c5'),
+        (11.0, '63c5')]
+    halves = [(0.0, ethernet(tcp(data, 0))), (0.5, ethernet(tcp(data, 971))), *(
         (float(at), ethernet(tcp([data[29:], data[:29]][at % 2], 1000 + 29 * at)))
         for at in range(1, 11))]  # after a loss, nobody waits for more than eight segments
-    assert [chunk.time for chunk in chunks_of(tmp_path / 'x', pcap(halves))] == [0, *4 * [9], 10]
+    assert [chunk.time for chunk in chunks_of(tmp_path / 'x', pcap(halves))] == [
+        0, 0.5, *4 * [8], 10]
 
 
 @for_all(('cuts', 'found'), [  # 58 bytes a message; found are messages, and their times
@@ -252,7 +257,8 @@ def test_what_sniff_has_written_is_read_as_it_was(tmp_path: Path) -> None:
         again = [entry for entry in entries_of(read) if entry.wire]
         assert [(entry.kind, entry.wire, entry.text) for entry in again] == [
             (entry.kind, entry.wire, entry.text) for entry in said]
-    assert chunks_of(tmp_path / 'other', pcap([(0.0, b'\1\7\0\0\x10\6')], 147)) == [
+    other = pcap([(0.0, b'\1\1\0\0'), (0.0, b'\1\7\0\0\x10\6')], 147)
+    assert chunks_of(tmp_path / 'other', other) == [
         Chunk(0.0, Direction.UNKNOWN, b'\x10\6')]
 
 
@@ -262,7 +268,7 @@ def test_serial_port_recorded_by_an_rtac_is_read(tmp_path: Path) -> None:
     head = bytes.fromhex('5BBE0468 00016378')
     packets = [(at + count * 32.0, head + bytes((event, 0, 0, 0)) + part) for count in range(3)
                for at, event, part in ((0.0, 4, sent[0]), (0.001, 4, sent[1]), (1.0, 0, b'x'))]
-    packets.append((100.0, b'short'))
+    packets += (100.0, b'short'), (100.0, head + b'\1\0\0\0')
     entries = entries_of(chunks_of(tmp_path / 'x', pcap(packets, link_type=250)))
     commands = [entry for entry in entries if entry.kind is Kind.COMMAND]
     assert [entry.text for entry in commands] == [
@@ -272,18 +278,20 @@ def test_serial_port_recorded_by_an_rtac_is_read(tmp_path: Path) -> None:
         pcapng([], '<', b'', 1e6).partition(block('<', 1, struct.pack('<HHI', ETHERNET, 0, 0)))[0],
         *(block('<', 1, struct.pack('<HHI', link_type, 0, 0)) for link_type in (250, COOKED)),
         *(block('<', 3, struct.pack('<I', len(data)) + data) for _, data in packets))))
-    assert b''.join(chunk.data for chunk in simple) == 3 * b''.join(sent)
+    assert [chunk.data for chunk in simple] == 3 * [*sent]
 
 
 @for_all(('content', 'fault'), [
-    (pcap(exchange())[:-5], 'byte 313: the file ends inside a packet'),
+    (pcap(exchange())[:-5], 'byte 329: the file ends inside a packet'),
     (pcap([])[:20], 'byte 20: the file ends inside a packet'),
     (pcap([]) + bytes(7), 'byte 31: the file ends inside a packet'),
-    (pcap([]) + struct.pack('<4I', 0, 0, 1 << 30, 0), 'a size of 1073741824 bytes'),
+    (pcap([]) + struct.pack('<4I', 0, 0, 1_000_001, 0), 'a size of 1000001 bytes'),
+    (pcap([]) + struct.pack('<4I', 0, 0, 1_000_000, 0), 'byte 40: the file ends inside a packet'),
     (pcap([(0.0, b'x')]), 'byte 41: no packet up to here has DF1'),
     (pcapng([], '<', b'', 1e6) + block('<', 6, struct.pack('<5I', 7, 0, 0, 0, 0)),
      'a packet without its interface'),
-    (pcapng([], '<', b'', 1e6) + struct.pack('<2I', 6, 5), 'a size of -7 bytes')])
+    (pcapng([], '<', b'', 1e6) + block('<', 6, bytes(16)), 'a packet without its interface'),
+    (pcapng([], '<', b'', 1e6) + block('<', 1, b'') + struct.pack('<2I', 6, 5), 'size of -7')])
 def test_damage_is_told_with_its_place(tmp_path: Path, content: bytes, fault: str) -> None:
     with pytest.raises(Problem) as problem:
         chunks_of(tmp_path / 'x', content)

@@ -37,10 +37,10 @@ REPLY = Entry(
     1.25, IN, Kind.REPLY, '1 to 5, TNS 1234: 01', 1, Checksum.CRC, True,
     Packet(5, 1, 0x46, 0, 0x1234, b'\x01'), 0.75)
 REFUSAL = Entry(1.0, IN, Kind.REPLY, 'STS 50: no', 1, Checksum.CRC, True,
-                Packet(5, 1, 0x46, 0x50, 0x1234), 0.25, marks=(Mark.DUPLICATE,))
+                Packet(5, 1, 0x46, 0x50, 0x1234), 0.0, marks=(Mark.DUPLICATE,))
 DAMAGED = Entry(2.0, IN, Kind.DAMAGED, 'wrong check', 1, Checksum.BCC, False,
                 Packet(5, 1, 0x46, 0x50, 7))
-POLL = Entry(None, Direction.UNKNOWN, Kind.POLL, '', 16, Checksum.BCC, True)
+POLL = Entry(None, Direction.UNKNOWN, Kind.POLL, '', 0, Checksum.BCC, True)
 NOISE = Entry(3.0, IN, Kind.NOISE, '2 bytes outside of any frame', size=2)
 
 
@@ -49,9 +49,10 @@ NOISE = Entry(3.0, IN, Kind.NOISE, '2 bytes outside of any frame', size=2)
               'RETRANSMISSION'),
     (REPLY, '     1.250000 <   1 reply    1 to 5, TNS 1234: 01 | CRC good | 750.0 ms'),
     (DAMAGED, '     2.000000 <   1 damaged  wrong check | BCC BAD'),
-    (POLL, '            - ?  16 poll     BCC good'),
+    (POLL, '            - ?   0 poll     BCC good'),
     (NOISE, '     3.000000 <     noise    2 bytes outside of any frame'),
-    (Entry(0.0, IN, Kind.ACK, guest='\x1b[2J'), '     0.000000 <     ACK      guest \\x1b[2J')])
+    (Entry(0.0, IN, Kind.ACK, latency=0.0, guest='\x1b[2J'),
+     '     0.000000 <     ACK      guest \\x1b[2J | 0.0 ms')])
 def test_entry_has_its_line_of_text(entry: Entry, text: str) -> None:
     assert text_line(entry) == text
 
@@ -86,24 +87,24 @@ def summary() -> Summary:
     summary = Summary(9600)
     summary.take(Chunk(0.0, OUT, bytes(600)))
     summary.take(Chunk(2.0, IN, bytes(360)))
-    for entry in (replace(POLL, valid=False), COMMAND, REPLY, REFUSAL, DAMAGED, NOISE,
-                  *(Entry(2.0, IN, kind, station=16, marks=(mark,)) for number, (kind, mark) in
+    for entry in (COMMAND, REPLY, REFUSAL, DAMAGED, replace(POLL, valid=False), NOISE,
+                  *(Entry(2.0, IN, kind, station=0, marks=(mark,)) for number, (kind, mark) in
                     enumerate(zip(Kind, 2 * [*Mark]), 1) for _ in range(number))):
         summary.add(entry)
     return summary
 
 
 def test_summary_counts_what_was_seen_and_what_was_wrong(summary: Summary) -> None:
-    head, seen, faults, latency, _, one, sixteen = summary_lines(summary, HALF)
+    head, seen, faults, latency, _, zero, one = summary_lines(summary, HALF)
     assert head == ('summary: 2.0 s, 960 bytes (600 >, 360 <), half duplex, CRC, '
                     'line load 50.0% at 9600 baud')
     assert seen == ('  seen: 3 commands, 5 replies, 1 of them with an error, 2 polls, 6 EOT, '
                     '4 ACK, 5 NAK, 7 ENQ, 14 forwarded')
     assert faults == ('  faults: 10 damaged, 2 bytes of noise, 9 retransmissions, 11 duplicates, '
                       '12 commands without reply, 11 polls and messages without answer')
-    assert latency == '  replies after: mean 500.0 ms, max 750.0 ms'
-    assert one.split() == ['1', '0', '0', '1', '2', '1', '1', '2', '0', '500.0', '750.0']
-    assert sixteen.split() == ['16', '2', '11', '2', '3', '0', '9', '18', '12', '-', '-']
+    assert latency == '  replies after: mean 375.0 ms, max 750.0 ms'
+    assert one.split() == ['1', '0', '0', '1', '2', '1', '1', '2', '0', '375.0', '750.0']
+    assert zero.split() == ['0', '2', '11', '2', '3', '0', '9', '18', '12', '-', '-']
 
 
 def test_json_has_all_that_the_summary_tells(summary: Summary) -> None:
@@ -114,7 +115,7 @@ def test_json_has_all_that_the_summary_tells(summary: Summary) -> None:
             'kind': 'summary', 'seconds': 2.0, 'bytes': {'>': 600, '<': 360}, 'check': 'CRC',
             'duplex': 'half', 'baud': 9600, 'load': 0.5, 'errors': 1, 'damaged': 10, 'noise': 2}
     assert [(station, counts['latency_ms']) for station, counts in found['stations'].items()] == [
-        ('1', {'mean': 500.0, 'max': 750.0}), ('16', None)]
+        ('0', None), ('1', {'mean': 375.0, 'max': 750.0})]
     assert [*found['counts'].items()] == [*zip((kind.value for kind in Kind), (
         2, 3, 5, 4, 5, 6, 7, 9, 9, 11, 11, 12))]
     assert [*found['marks'].values()] == [9, 11, 12, 14, 16, 18]
@@ -128,7 +129,7 @@ def test_what_is_not_known_is_left_out() -> None:
     assert [*summary_lines(summary, LineKind(None, None))] == [
         'summary: 1 byte', '  seen: none', '  faults: none']
     assert json.loads(json_line(POLL)) == {
-        'direction': '?', 'kind': 'poll', 'station': 16, 'check': 'BCC', 'valid': True}
+        'direction': '?', 'kind': 'poll', 'station': 0, 'check': 'BCC', 'valid': True}
 
 
 def _heard(summary: Summary, begun: float = 10.0) -> Summary:
@@ -151,6 +152,6 @@ def test_load_is_known_where_baud_and_duplex_are(
 def test_recordings_one_after_the_other() -> None:
     summary = _heard(Summary(9600))
     summary.take(Chunk(None, OUT, b''))  # of one without times
-    _heard(summary, 4.0)
-    assert summary.seconds == 2.0
+    _heard(_heard(summary, 4.0), 2.0)
+    assert summary.seconds == 3.0
     assert summary.load(Duplex.HALF) == 0.5

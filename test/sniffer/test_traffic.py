@@ -127,6 +127,8 @@ def test_repetitions_are_marked() -> None:
     marks = [entry.marks for entry in entries if entry.packet]
     assert marks == [(), (Mark.RETRANSMISSION,), (Mark.DUPLICATE,), (), (Mark.RETRANSMISSION,),
                      (Mark.DUPLICATE,)]
+    sent = COMMAND._replace(dst=0)  # by a slave to station 0
+    assert decode([poll, (IN, message(sent)), (OUT, master(sent))])[2].marks == (Mark.RELAYED,)
 
 
 def test_slaves_that_do_not_answer() -> None:
@@ -315,11 +317,11 @@ def test_conversations_are_heard_as_they_say(conversation: Conversation) -> None
 def test_command_of_a_guest_and_its_reply_name_him() -> None:
     session = TrafficDecoder()
     note = f'{COMMAND.tns:04X} pty:/tmp/hmi'
-    found = [entry for chunk in (
-        Chunk(0.0, OUT, master(COMMAND), guest=note), Chunk(0.1, IN, message(REPLY)))
-        for entry in session.feed(chunk)]
+    found = sniffed((
+        Chunk(0.0, OUT, master(COMMAND), guest=note), Chunk(0.1, IN, message(REPLY)),
+        Chunk(0.2, OUT, master(COMMAND._replace(tns=1)), guest='0001 tcp:a')), session)
     assert [(entry.guest, entry.request) for entry in found] == [
-        ('pty:/tmp/hmi', None), ('pty:/tmp/hmi', COMMAND)]
+        ('pty:/tmp/hmi', None), ('pty:/tmp/hmi', COMMAND), *2 * [('tcp:a', None)]]
 
 
 @for_all('capture', CAPTURES)
@@ -350,7 +352,7 @@ def test_every_recorded_file_is_in_the_index() -> None:
 # A radio modem network, against what has happened there
 
 
-RECORDER = 9
+RECORDER = 0
 READ = bytes.fromhex('A2 04 07 89 00 00')
 
 
@@ -400,7 +402,7 @@ def happening(random: Random, count: int) -> Iterator[Said]:
 
 
 def chunks(told: Iterable[Said], is_recorded: bool) -> Iterator[Chunk]:
-    """Yield it as node 9 has recorded it, or as it was heard at an aerial."""
+    """Yield it as node 0 has recorded it, or as it was heard at an aerial."""
     for said in told:
         frame = message_frame(said.packet.encode(), Checksum.CRC)
         frame = frame if said.is_good else frame[:9] + bytes((frame[9] ^ 0x24,)) + frame[10:]
@@ -425,7 +427,7 @@ def test_each_packet_is_told_as_what_it_was(seed: int, is_recorded: bool) -> Non
         assert entry.packet == said.packet
         assert entry.marks == (() if said.mark is None else (said.mark,)), said
         by_us = is_recorded and said.mark is Mark.FORWARDED and said.sender == RECORDER
-        assert (', sent on by 9: ' in entry.text) is by_us
+        assert (', sent on by 0: ' in entry.text) is by_us
         # Each reply is that of its command, and counts once.
         assert (entry.latency is not None) is (said.packet.is_reply and said.mark is None)
 
