@@ -49,7 +49,7 @@ _WORD = re.compile(r'[A-Za-z_]+|-*>+|<+-*')
 # A line with only bytes: pairs, or groups of pairs, with the same sign between them.
 _PAIRS = re.compile(r'(?P<group>(?:[0-9A-Fa-f]{2})+)(?:(?P<sign>[ -])(?:[0-9A-Fa-f]{2})+'
                     r'(?:(?P=sign)(?:[0-9A-Fa-f]{2})+)*)?')
-_BYTE = r'(?:0x)?[0-9A-Fa-f]{2}'
+_BYTE = r'(?:0[xX])?[0-9A-Fa-f]{2}'
 _AFTER = r'(?![0-9A-Za-z:=.])'
 # A run of bytes. It may include characters beside the bytes that look like more bytes.
 _BYTES = re.compile(rf'(?:^|(?<=[\s,\[({{"\'])){_BYTE}(?:[\s,;-]+{_BYTE})*{_AFTER}')
@@ -59,7 +59,7 @@ _REST = re.compile(r'[\s,;\])}"\']*')
 # line is refused if this stands between its direction or time and its bytes, or instead of bytes.
 _HEX = r'(?=[A-Fa-f]*\d)[0-9A-Fa-f]+|[A-F]|(?:[A-Fa-f]{2}){1,2}|[0-9A-Fa-f]{2}h'
 _LEFT_OVER = re.compile(
-    rf'(?<![\w=(\[.#])(?:0x|\\x)?(?:{_HEX})'
+    rf'(?<![\w=(\[.#])(?:0[xX]|\\x)?(?:{_HEX})'
     r'(?![\w=)]|:(?:\s|$)| bytes?\b| *\||\.\d+(?![\w.])|(?<=\w{4})(?:\s{2}|\t))|\bb[\'"]')
 _GLUED = re.compile(r'(?:[0-9A-Fa-f]{2})+(?=[\s,;-]|$)')
 _LITERAL = re.compile(r'\bb(?P<sign>[\'"])(?:\\.|(?!(?P=sign)).)*(?P=sign)')

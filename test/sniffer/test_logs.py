@@ -322,7 +322,7 @@ def test_words_whose_offsets_do_not_fit_are_refused(lines: list[str], text: str)
     # what would be left over
     '12:00:01.000 TX 10 05 01 FF RX 10 04', 'TX 10 05 01 FF BCC 0A', 'TX: 10 05 01 FF len: 04',
     'TX10 05 01 FF', 'TX100501FF', '>10 05 01', 'TX 10 5 01 FF', 'RX 10 0 04', 'TX 5 tx FF',
-    '12:00:01 10 5 01 FF', 'TX 100501FF 0A', 'TX 100501FF', 'RX 10h 04h', 'RX 0x10|0x04',
+    '12:00:01 10 5 01 FF', 'TX 100501FF 0A', 'TX 100501FF', 'RX 10h 04h', 'RX 0X10|0X04',
     r'RX \x10\x04', r"TX b'\x10\x05' RX b'\x10\x04'", r"TX b'\x10' 06", r"TX b'\x1'", "TX b'AG"])
 def test_what_can_be_read_in_two_ways_is_refused(line: str) -> None:
     with pytest.raises(Problem, match='is not a hexadecimal dump'):
@@ -341,7 +341,7 @@ def test_characters_that_look_like_bytes_staycharacters() -> None:
 
 @for_all('line', [
     'TX1 10 06', 'TX (2) 10 06', 'TX #17 10 06', 'TX 2 bytes: 10 06', 'RX a bad reply: 10 06',
-    'RX 12.5 ms: 10 06', '7 12:00:01 10 06', 'uint8_t tx[2] = { 0x10, 0x06 };',
+    'RX 12.5 ms: 10 06', '7 12:00:01 10 06', 'uint8_t tx[2] = { 0X10, 0X06 };',
     '"data",0.0005,0.0001,0x10,0x06', r"Sent 2: b'\x10\x06' (2 bytes)"])
 def test_counts_labels_and_words_are_not_left_over_bytes(line: str) -> None:
     assert [chunk.data for chunk in read(iter([line]))] == [b'\x10\x06']
