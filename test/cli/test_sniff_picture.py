@@ -210,7 +210,7 @@ def test_recordings_one_after_the_other_and_without_times(tmp_path: Path, capsys
 
 def test_names_are_text_and_nothing_else(tmp_path: Path, capsys: Output) -> None:
     name = EVIL.replace('/', '')
-    path = Path(capture(tmp_path / name, exchange(0.1, 1), exchange(99.0, 2)))
+    path = Path(capture(tmp_path / name, exchange(0.1, 1), exchange(9999.0, 2)))
     path.write_text(path.read_text('ascii').replace('2026-03-01T14', '9999-12-31T23'), 'ascii')
     found = drawn(tmp_path, capsys, str(path))
     assert 'script' not in found.tags()

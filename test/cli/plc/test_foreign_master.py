@@ -253,9 +253,9 @@ def test_reads_of_a_full_duplex_line_are_heard_on_two_ports(
 
 @for_all(('cmd', 'data', 'times', 'row'), [
     (0x0F, 'A1 04 07 89 00', 1, 'n7_0_2_of_3,Read,N7:0,3,SLC,2,50000'),
-    (0x0F, 'A2 08 0A 91 00 00', 2, 'l10_0_2_of_3,Read,L10:0,3,SLC,2,5000'),
+    (0x0F, 'A2 08 0A 91 00 00', 2, 'l10_0_2_of_3,Read,L10:0,3,SLC,2,50000'),
     (0x2F, '68 00 00 02 00 06 07 00 02 00', 3, 'n7_0_2_of_3,Read,N7:0,3,PLC5,2,5000'),
-    (0x01, '20 00 04', 4, '020_2_of_3,Read,020,3,PLC2,2,2000'),
+    (0x01, '20 00 04', 4, '020_2_of_3,Read,020,3,PLC2,2,5000'),
     *((0x01, data, 1, f'# station 3: unprotected read 020 (ADDR {text} bytes: 1 time')
       for data, text in (('20 00 03', '32), 3'), ('21 00 02', '33), 2'))),
     (0x0F, 'A2 06 04 86 00 02', 1, '# station 3: protected typed logical read T4:0.ACC, 3 words: '
@@ -266,7 +266,7 @@ def test_reads_of_a_full_duplex_line_are_heard_on_two_ports(
 def test_row_of_a_read_has_type_length_and_twice_the_interval(
         cmd: int, data: str, times: int, row: str) -> None:
     command = Packet(3, 0, cmd, 0, 7, bytes.fromhex(data))
-    carried = Carried(3, describe(command), command, 2.0, 2.0 + 2.5 * (times > 1), times)
+    carried = Carried(3, describe(command), command, 2.0, 2.0 + {1: 0, 2: 99}.get(times, 5.0), times)
     first, second = map_of([carried, carried]).splitlines()[-2:]
     assert first == row and second.startswith(f'# station 3: {carried.text}: ')
 
