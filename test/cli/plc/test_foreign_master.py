@@ -266,7 +266,8 @@ def test_reads_of_a_full_duplex_line_are_heard_on_two_ports(
 def test_row_of_a_read_has_type_length_and_twice_the_interval(
         cmd: int, data: str, times: int, row: str) -> None:
     command = Packet(3, 0, cmd, 0, 7, bytes.fromhex(data))
-    carried = Carried(3, describe(command), command, 2.0, 2.0 + {1: 0, 2: 99}.get(times, 5.0), times)
+    last = {1: 2.0, 2: 99.0}.get(times, 7.0)
+    carried = Carried(3, describe(command), command, 2.0, last, times)
     first, second = map_of([carried, carried]).splitlines()[-2:]
     assert first == row and second.startswith(f'# station 3: {carried.text}: ')
 
