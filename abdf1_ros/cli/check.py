@@ -336,14 +336,14 @@ def _folded(text: str) -> str:
 
 def _line_text(report: Report) -> str:
     network = report.network
-    mappings, blocks = len(report.mappings.repeated), len(report.blocks)
+    mappings = len({row for block in report.blocks for row in block.mappings})
     if network.line_mode.only_listens:
         return _listening_text(report)
     return (f'{printable(network.port)}: Mode {network.mode}, {network.baud} baud, '
             f'{network.data_bits} data bits, parity {network.parity}, {network.stop_bits} stop, '
             f'{network.error_code}; our own Station is {network.station}\n'
             f'{mappings} {"mapping is" if mappings == 1 else "mappings are"} read with '
-            f'{counted(blocks, "block")}')
+            f'{counted(len(report.blocks), "block")}')
 
 
 def _listening_text(report: Report) -> str:
