@@ -123,7 +123,7 @@ door,Read,plc-gw.acme.example,10.1.2.3,/home/jdoe,,,,,,,
 """
 RESULT = {
     'target': 'slave', 'processor': 'PRESS_ACME', 'station': '2', 'check': 'CRC', 'port': 'jdoe',
-    'baud': '/dev/ttyACME', 'cases': [{
+    'baud': '/dev/ttyACME', 'abdf1_ros': '0.2.0', 'cases': [{
         'case': 'slave-ack', 'verdict': 'PASS', 'rule': 'an ACK', 'source': 'M 3-4',
         'seconds': 0.1, 'expected': 'acme', 'got': 'jdoe', 'transcript': ['> 10 02 b7 2a']}]}
 NAMES = ('jdoe', 'joe', 'acme', 'plc-gw', '10.1.2.3', '4001', '4002', 'home', 'hmi', 'booth',
@@ -139,7 +139,7 @@ def test_anonymous_bundle_has_no_name_of_a_host_user_path_or_port(
              'plc-gw.txt': 'Port of jdoe\n',
              'export.csv': 'Tag Name,Address,Client Access\njdoe,,\n',
              'empty.csv': 'Tag,Command\n', 'jdoe.json': json.dumps(RESULT),
-             'issue.md': '- port: /dev/ttyACME\n'}
+             'issue.md': '- port: /dev/ttyACME\n', 'list.json': '["/dev/ttyACME"]'}
     for name, text in files.items():
         (folder / name).write_text(text, encoding='utf-8')
     recorded = folder / 'acme.cap'
@@ -167,7 +167,7 @@ def test_anonymous_bundle_has_no_name_of_a_host_user_path_or_port(
     assert found['settings/2_map.csv'] == '\n'
     assert found['settings/unread.txt'].startswith('left out: ')
     assert json.loads(found['conformance/result.json']) == {
-        'target': 'slave', 'check': 'CRC', 'station': '2', 'cases': [{
+        'target': 'slave', 'check': 'CRC', 'station': '2', 'abdf1_ros': '0.2.0', 'cases': [{
             'case': 'slave-ack', 'verdict': 'PASS', 'rule': 'an ACK', 'source': 'M 3-4',
             'seconds': '0.1'}]}
     assert found['conformance/1_result.json'].startswith('left out: ')
