@@ -147,6 +147,7 @@ class Timeline:
             length = min(16.0, max(0.5, 19200 / baud)) if baud else 1.0
             length, unit = (_CHARACTERS, 'bytes') if time is None else (length, 's')
             self._recordings.append(_Drawing(len(self._recordings) + 1, length, unit))
+            self._characters = 0
         recording = self._recordings[-1]
         recording.begun = recording.begun or _moment(begun)
         self._character = BITS_PER_CHARACTER / baud if baud else 0.0
