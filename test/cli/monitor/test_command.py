@@ -252,10 +252,12 @@ class Window:
 
     def __init__(self) -> None:
         self.keys: list[int] = []
+        self.calls: list[str] = []
         self.drawn: dict[int, tuple[str, int]] = {}
 
     def addnstr(self, row: int, column: int, text: str, width: int, look: int) -> None:
         self.drawn[row] = text, look
+        self.calls.append('addnstr')
 
     def getmaxyx(self) -> tuple[int, int]:
         return 24, 80
@@ -263,10 +265,8 @@ class Window:
     def getch(self) -> int:
         return self.keys.pop(0) if self.keys else -1
 
-    def _ignore(self, *args: object) -> None:
-        pass
-
-    nodelay = erase = refresh = clearok = _ignore
+    def __getattr__(self, name: str) -> Callable[..., None]:
+        return lambda *args: self.calls.append(name)
 
 
 def test_keys_move_the_picture(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -278,17 +278,20 @@ def test_keys_move_the_picture(monkeypatch: pytest.MonkeyPatch) -> None:
             ([], 0, 22), ([curses.KEY_DOWN, curses.KEY_DOWN], 2, 24), ([curses.KEY_UP], 1, 23),
             ([curses.KEY_NPAGE], 23, 45), ([ord(' ')], 37, 59), ([curses.KEY_PPAGE], 15, 37),
             ([ord('l')], 30, 52), ([ord('v'), ord('x'), -1, ord('q')], 30, 52),
-            ([curses.KEY_END], 37, 59), ([curses.KEY_HOME, curses.KEY_UP], 0, 22)):
+            ([curses.KEY_END], 37, 59), ([curses.KEY_HOME, curses.KEY_DOWN], 1, 23)):
         window.keys = keys
         assert not screen.wants_end()
         screen.show(picture)
         assert [window.drawn[row][0] for row in (0, 22, 23)] == [
             f'line {first}', f'line {last}', f'{first + 1}-{last + 1} of 60  q:end v:values '
             'r:reasons w:writes l:link s:stations c:counters']
-    screen.show(picture[:3])
-    assert window.drawn[23][0].startswith('1-3 of 3  ')
-    window.keys = [ord('l'), ord('q')]  # the part is not there any more
-    assert screen.wants_end()
+    for count, shown in ((0, '0-0 of 0  '), (3, '1-3 of 3  ')):
+        window.calls = []
+        screen.show(picture[:count])
+        assert window.calls == ['erase', *(count + 1) * ['addnstr'], 'refresh']
+        assert window.drawn[23][0].startswith(shown)
+    window.keys = [12, curses.KEY_RESIZE, ord('l'), ord('q')]  # the part is not there any more
+    assert screen.wants_end() and window.calls[-2:] == 2 * ['clearok']
     screen.show(picture)
     assert window.drawn[0][0] == 'line 0'
 
@@ -318,24 +321,27 @@ def test_mark_stays_at_its_line_where_others_come(monkeypatch: pytest.MonkeyPatc
 
     def chosen(names: str, *keys: int) -> str | None:
         screen.show_list([TextLine('heading'), *(
-            TextLine(name, section=name) for name in names.split())])
+            TextLine(name, Style.TITLE, name) for name in names.split())])
         window.keys = [*keys]
         return screen.chosen if screen.wants_other_list() else None
 
     assert chosen('', ord('\n')) is None
     assert chosen('packing paint press', ord('\n')) == 'paint'
     assert chosen('glue packing paint press', ord('\n')) == 'paint'
-    assert chosen('glue packing paint press', curses.KEY_UP, curses.KEY_UP) is None
+    assert chosen('glue packing paint press', *3 * [curses.KEY_UP]) is None
     assert chosen('glue packing paint press', ord('\n')) == 'glue'
     assert chosen('packing paint', ord('\n')) == 'packing'
     plant = ' '.join(f'line{number}' for number in range(60))  # 22 of them fit
     for key in (curses.KEY_HOME, curses.KEY_NPAGE):
         assert chosen(plant, key) is None
     assert chosen(plant, ord('\n')) == 'line21'
-    assert {('line20', 0), ('line21', curses.A_REVERSE)} <= {*window.drawn.values()}
+    bold, marked = curses.A_BOLD, curses.A_BOLD | curses.A_REVERSE
+    assert {('line20', bold), ('line21', marked)} <= {*window.drawn.values()}
     assert [chosen(plant, key) for key in (curses.KEY_END, ord('\n'), curses.KEY_UP, ord('\n'))
             ] == [None, 'line59', None, 'line58']
-    assert {('line58', curses.A_REVERSE), ('line59', 0)} <= {*window.drawn.values()}
+    assert {('line58', marked), ('line59', bold)} <= {*window.drawn.values()}
+    assert [chosen(plant, key) for key in (curses.KEY_HOME, ord('\n'))] == [None, 'line0']
+    assert window.drawn[1] == ('line0', marked)
 
 
 def test_line_stays_marked_while_its_picture_is_shown(monkeypatch: pytest.MonkeyPatch) -> None:

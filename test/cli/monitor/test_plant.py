@@ -34,7 +34,7 @@ from support.ros import ERROR, Observer, OK, PATIENCE
 NOW = 1000.0
 LINK = ShownStatus('link', Style.GOOD, 'OK: port open',
                    {'line load': '93 %', 'poll cycle with Periods': '34 ms'})
-FRESH = ShownStatus('mappings', Style.GOOD, 'OK: of 10 mappings 10 fresh')
+FRESH = ShownStatus('mappings', Style.GOOD, 'OK: of 10 mappings 10 fresh', {'line load': '0 %'})
 SILENT = ShownStatus('station 3', Style.BAD, 'ERROR: station 3 inactive for 4.0 s')
 REFUSED = ShownStatus('writes', Style.WARNING, 'WARN: 3 of 4 writes confirmed')
 
@@ -112,12 +112,13 @@ def test_bridges_are_heard_and_others_are_not(
     down.status[0].values = [KeyValue(key='running', value='1'), KeyValue(key='/hall/c'),
                              KeyValue(key='/hall/b', value='b_net.csv:2:1: Baud')]
     with PlantWatch([]) as watch:
-        publish(watch, lambda lines: set(lines) == {'/hall/a', '/hall/b', '/hall/c'},
-                DiagnosticArray(), array('battery', link=OK),
-                array('hall/a', link=OK, mappings=ERROR), down)
+        publish(watch, lambda lines: set(lines) == {'/hall/a', '/hall/b', '/hall/c'} and
+                'not run' in str(lines['/hall/b']), DiagnosticArray(), array('battery', link=OK),
+                *(array(f'hall/{name}', link=OK, mappings=ERROR) for name in 'ab'), down)
         lines = {line.name: line.worst(line.told) for line in watch.lines()}
-        monkeypatch.setattr(watch, 'bridges', lambda: ['/hall/a'])
-        assert watch.is_complete
+        for name in 'ad':
+            monkeypatch.setattr(watch, 'bridges', lambda: [f'/hall/{name}'])  # noqa: B023
+            assert watch.is_complete is (name == 'a')
     assert lines['/hall/a'] == ShownStatus('mappings', Style.BAD, '')
     assert lines['/hall/b'] == ShownStatus('', Style.BAD, 'does not run: b_net.csv:2:1: Baud')
 
