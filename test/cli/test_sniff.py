@@ -103,27 +103,6 @@ def test_hex_and_binary_files_say_the_same_without_times(capsys: Output, tmp_pat
         assert [re.sub(r'^ +-', '', line) for line in lines_of(capsys, *args)[:5]] == expected
 
 
-def test_json_has_one_object_a_line_and_the_summary_last(capsys: Output, capture: str) -> None:
-    objects = [json.loads(line) for line in lines_of(capsys, '--json', capture)]
-    assert [entry['kind'] for entry in objects] == [
-        'command', 'ACK', 'poll', 'reply', 'ACK', 'summary']
-    assert objects[3]['latency_ms'] == 30.0
-    assert objects[5]['counts'] == {'poll': 1, 'command': 1, 'reply': 1, 'ACK': 2}
-    assert [json.loads(line) for line in lines_of(capsys, '--json', '--summary', capture)] == \
-        objects[5:]
-
-
-def test_summary_alone_shows_the_load_at_a_baud_rate(capsys: Output, capture: str) -> None:
-    head, *_ = lines_of(capsys, '--summary', '--baud', '19200', capture)
-    assert head == ('summary: 0.0 s, 45 bytes (27 >, 18 <), half duplex, CRC, '
-                    'line load 58.6% at 19200 baud')
-
-
-def test_files_one_after_the_other(capsys: Output, capture: str) -> None:
-    assert lines_of(capsys, '--summary', capture, capture)[1] == \
-        '  seen: 2 commands, 2 replies, 2 polls, 4 ACK'
-
-
 def test_capture_with_other_settings_is_of_another_line(capsys: Output, tmp_path: Path) -> None:
     """As after a change of net.csv: a start of the node renames the trace to ``.1``."""
     paths = []
