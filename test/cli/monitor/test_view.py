@@ -19,6 +19,7 @@ import math
 from abdf1_ros.cli.monitor.curves import ASCII, Curve
 from abdf1_ros.cli.monitor.curves import WIDTH as CURVE_WIDTH
 from abdf1_ros.cli.monitor.view import (
+    LINK_KEYS,
     NodeView,
     Reading,
     render,
@@ -174,7 +175,8 @@ def test_value_that_does_not_come_here_is_in_the_verdict_though_the_bridge_is_co
     for reading in (Reading('a', [1], received=NOW - 5, promised=1.0), Reading('a', promised=1.0)):
         told = lines(snapshot(statuses=good, readings=[reading, Reading('b', [1])]))
         assert told[0] == '/cell/abdf1  ERROR: topics: 1 of 2 topics without a fresh value here'
-    assert lines(snapshot(statuses=good, readings=[Reading('a')]))[0].endswith('2 fresh')
+    readings = [Reading('a'), Reading('empty', '', '', NOW, 1.0)]
+    assert lines(snapshot(statuses=good, readings=readings))[0].endswith('2 fresh')
 
 
 @for_all(('reading', 'state'), [
@@ -264,10 +266,12 @@ def test_mappings_name_what_is_wrong_and_leave_the_counts_to_the_summary() -> No
 
 
 def test_results_of_writes_are_shown_with_value_age_and_latency() -> None:
-    picture = snapshot(results=[ShownStatus(
+    lost = ShownStatus('writes', Style.WARNING, 'WARN: lost', {'lost': '0'})
+    picture = snapshot(statuses=[lost], results=[ShownStatus(
         'recipe', Style.BAD, 'not written: refused', {'value': '[1, 2]', 'latency_ms': '0.3'},
         NOW - 2)])
     line = line_with('recipe', picture)
+    assert styles_of('  writes       WARN: lost', picture) == [Style.WARNING] * 2
     assert line.text.strip() == '2.0 s ago: recipe [1, 2] not written: refused (0.3 ms)'
     assert line.style is Style.BAD
 
@@ -282,7 +286,7 @@ def test_only_counters_that_have_counted_are_shown() -> None:
 
 
 @for_all(('changes', 'text', 'style'), [
-    ({'is_there': False}, 'the node is gone', Style.BAD),
+    ({'is_there': False, 'told': NOW - 5}, 'ERROR (1 of 2): the node is gone', Style.BAD),
     ({'is_there': False, 'told': None}, 'the node is not found yet', Style.BAD),
     ({'is_there': False, 'stopped': 'does not run: no port'}, 'not run: no port', Style.BAD),
     ({'told': None}, 'no diagnostics yet; if /diagnostics is remapped', Style.WARNING),
@@ -317,7 +321,7 @@ def test_values_never_take_more_than_their_width(values: list[float] | str, widt
 def test_no_line_is_wider_than_the_terminal(width: int, name: str, text: str) -> None:
     picture = snapshot(
         readings=[Reading(name, text, name, NOW, 1.0)],
-        statuses=[ShownStatus('link', Style.GOOD, text, {'settings': text}),
+        statuses=[ShownStatus('link', Style.GOOD, text, {LINK_KEYS[-1]: text}),
                   *(ShownStatus(part, Style.GOOD, text, {name: text})
                     for part in ('mappings', 'counters'))])
     widths = [len(line) for line in lines(picture, max(width, 20))]
