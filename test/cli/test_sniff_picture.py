@@ -74,23 +74,6 @@ def test_each_message_is_a_bar_in_the_lane_of_its_station(tmp_path: Path, capsys
         '| CRC good' in found.texts
 
 
-def test_bar_begins_and_ends_as_its_bytes_did(tmp_path: Path, capsys: Output) -> None:
-    found = drawn(tmp_path, capsys, capture(
-        tmp_path / 'line.cap', exchange(0.1, 1), [(0.2, '>', 2 * frames.poll_frame(3))]))
-    (ask,), (_, answer) = ([rect for _, rect in found.found
-                            if rect.get('class') == look and 'x' in rect]
-                           for look in ('ask', 'answer'))
-    assert int(answer['y']) - int(ask['y']) == 14  # in the lower row
-    scale = sniff_picture.drawing.__globals__
-    second = scale['WIDTH'] - scale['NAMES'] - scale['_RIGHT']
-    # The command begins at 0.1 s, with 20 characters; the reply ends at 0.13 s.
-    assert float(ask['x']) == pytest.approx(scale['NAMES'] + 0.1 * second, abs=0.2)
-    assert float(answer['x']) + float(answer['width']) == pytest.approx(
-        scale['NAMES'] + 0.13 * second, abs=0.2)
-    assert len({rect['x'] for _, rect in found.found
-                if rect.get('class') == 'small' and 'x' in rect}) == 3 + 2
-
-
 def test_faults_come_as_episodes_that_lead_to_their_strip(tmp_path: Path, capsys: Output) -> None:
     found = drawn(tmp_path, capsys, capture(
         tmp_path / 'line.cap', exchange(0.1, 1), silence(1.2), exchange(2.0, 2, sts=0x10),
