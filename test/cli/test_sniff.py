@@ -87,14 +87,6 @@ def refused(capsys: Output, *args: str) -> str:
     return capsys.readouterr().err
 
 
-def test_capture_is_shown_line_by_line_with_a_summary(capsys: Output, capture: str) -> None:
-    lines = lines_of(capsys, capture)
-    assert lines[:5] == LINES and lines_of(capsys, '--check', 'crc', capture) == lines
-    assert lines[5].startswith('summary: 0.0 s, 45 bytes (27 >, 18 <), half duplex, CRC')
-    assert lines[6] == '  seen: 1 command, 1 reply, 1 poll, 2 ACK'
-    assert lines[7] == '  faults: none'
-
-
 def test_hex_and_binary_files_say_the_same_without_times(capsys: Output, tmp_path: Path) -> None:
     expected = [re.sub(r'^ +[0-9.]+| \| [0-9.]+ ms', '', line) for line in LINES]
     (tmp_path / 'bin').write_bytes(b''.join(SAID))

@@ -362,6 +362,10 @@ def test_direction_holds_for_lines_without_one_until_the_next() -> None:
              'uint8_t tx[] = { 0x10, 0x04 };']
     assert [(chunk.direction, chunk.data.hex()) for chunk in read(iter(lines))] == [
         (OUT, '1002'), (OUT, '0102'), (IN, '1006'), (IN, '0115'), (OUT, '1004')]
+    for way, known in (
+            (OUT, 'send sending write wrote out transmit Transmitted > >> >>> -> -->'),
+            (IN, 'receive recv receiving read in < << <<< <- <--')):
+        assert {read(iter([f'{name} 10 06']))[0].direction for name in known.split()} == {way}
 
 
 @for_all('line', [

@@ -127,7 +127,8 @@ def exchange(begun: float = 1000.0) -> list[tuple[float, bytes]]:
 
 @for_all('content', [
     pcap(exchange()), pcap(exchange(), order='>'), pcapng(exchange(), '<', b'', 1e6),
-    pcap(exchange(), 0x54000000 + ETHERNET, magic=0xA1B23C4D), pcapng(exchange(), '>', b'', 1e6),
+    *(pcap(exchange(), 0x54000000 + ETHERNET, order, 0xA1B23C4D) for order in '<>'),
+    pcapng(exchange(), '>', b'', 1e6),
     pcapng(exchange(), '<', NANOSECONDS, 1e9, others=1),
     pcapng(exchange()[:1], '>', bytes.fromhex('0009 0001 94000000 00000000'), 2 ** 20)
     + block('>', 3, bytes(4)) + pcapng(exchange()[1:], '<', NANOSECONDS, 1e9)])
@@ -158,7 +159,8 @@ def test_packets_that_the_recorder_has_cut_are_told_and_others_read(tmp_path: Pa
 @pytest.mark.parametrize('data', [
     encapsulated(cip(STATUS), is_connected=True), encapsulated(sent_through(cip(STATUS))),
     encapsulated(sent_through(cip(STATUS), 2000)),
-    encapsulated(bytes.fromhex('4B 03 21 00 67 00 24 01 03 4D 00') + STATUS)])
+    b''.join(bytes((command, *23 * [0])) for command in (0, 1, 4, *range(0x63, 0x67), 0x72, 0x73))
+    + encapsulated(bytes.fromhex('4B 03 21 00 67 00 24 01 03 4D 00') + STATUS)])
 def test_pccc_comes_connected_and_through_a_backplane(tmp_path: Path, data: bytes) -> None:
     chunk, = chunks_of(tmp_path / 'x', pcap([(0.0, ethernet(tcp(data, 1).replace(
         b'\xA8\0\x41', b'\xA8\1\x1E'), vlan=True))]))  # from 192.168.1.30 to 192.168.0.30
@@ -266,19 +268,20 @@ def test_serial_port_recorded_by_an_rtac_is_read(tmp_path: Path) -> None:
     """A write with BCC after which nothing comes (samt707/ambersloth, df1_orig_half_duplex)."""
     sent = bytes.fromhex('1002 0000 0F00 0139 AA02 0789 0500 4934'), bytes.fromhex('1003F9')
     head = bytes.fromhex('5BBE0468 00016378')
-    packets = [(at + count * 32.0, head + bytes((event, 0, 0, 0)) + part) for count in range(3)
-               for at, event, part in ((0.0, 4, sent[0]), (0.001, 4, sent[1]), (1.0, 0, b'x'))]
+    packets = [(event * 32.0, head + bytes((code, 0, 0, 0)) + part) for event in (1, 2, 3, 4)
+               for code, part in ((event, sent[0]), (event, sent[1]), (0, b'x'))]
     packets += (100.0, b'short'), (100.0, head + b'\1\0\0\0')
     entries = entries_of(chunks_of(tmp_path / 'x', pcap(packets, link_type=250)))
     commands = [entry for entry in entries if entry.kind is Kind.COMMAND]
     assert [entry.text for entry in commands] == [
-        '0 to 0, TNS 3901: protected typed logical write N7:5 = 13385'] * 3
+        '0 to 0, TNS 3901: protected typed logical write N7:5 = 13385'] * 4
     assert not any(entry.kind is Kind.NOISE for entry in entries)
     simple = chunks_of(tmp_path / 'simple', b''.join((  # whose packets are filled up to words
         pcapng([], '<', b'', 1e6).partition(block('<', 1, struct.pack('<HHI', ETHERNET, 0, 0)))[0],
         *(block('<', 1, struct.pack('<HHI', link_type, 0, 0)) for link_type in (250, COOKED)),
         *(block('<', 3, struct.pack('<I', len(data)) + data) for _, data in packets))))
-    assert [chunk.data for chunk in simple] == 3 * [*sent]
+    assert [chunk[1:3] for chunk in simple] == 2 * [
+        (way, part) for way in (Direction.OUT, Direction.IN) for part in sent]
 
 
 @for_all(('content', 'fault'), [

@@ -60,7 +60,9 @@ def test_entry_has_its_line_of_text(entry: Entry, text: str) -> None:
 @for_all(('entry', 'shade'), [
     (COMMAND, '\x1b[33m'), (REFUSAL, '\x1b[31m'), (DAMAGED, '\x1b[31m'), (POLL, '\x1b[2m'),
     (NOISE, '\x1b[31m'), (Entry(0.0, IN, Kind.SILENCE), '\x1b[33m'),
-    (replace(POLL, valid=False), '\x1b[31m')])
+    (replace(POLL, valid=False), '\x1b[31m'), (Entry(0.0, IN, Kind.NAK), '\x1b[33m'),
+    *((Entry(0.0, IN, kind), '\x1b[31m') for kind in (Kind.UNANSWERED, Kind.UNKNOWN)),
+    *((Entry(0.0, IN, kind), '\x1b[2m') for kind in (Kind.ACK, Kind.EOT))])
 def test_line_has_the_colour_of_its_kind(entry: Entry, shade: str) -> None:
     assert text_line(entry, colour=True) == f'{shade}{text_line(entry)}\x1b[0m'
     assert text_line(REPLY, colour=True) == text_line(REPLY)

@@ -273,11 +273,13 @@ def test_keys_move_the_picture(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr('curses.has_colors', lambda: False)
     window = Window()
     screen = Screen(window)  # type: ignore[arg-type]
-    picture = [TextLine(f'line {number}', section='link' * (number == 30)) for number in range(60)]
+    names = {30: 'link', 31: 'reasons', 34: 'writes'}
+    picture = [TextLine(f'line {row}', section=names.get(row, '')) for row in range(60)]
     for keys, first, last in (
             ([], 0, 22), ([curses.KEY_DOWN, curses.KEY_DOWN], 2, 24), ([curses.KEY_UP], 1, 23),
             ([curses.KEY_NPAGE], 23, 45), ([ord(' ')], 37, 59), ([curses.KEY_PPAGE], 15, 37),
-            ([ord('l')], 30, 52), ([ord('v'), ord('x'), -1, ord('q')], 30, 52),
+            ([ord('l')], 30, 52), ([ord('r')], 31, 53), ([ord('w')], 34, 56), ([ord('l')], 30, 52),
+            ([ord('v'), ord('x'), -1, ord('q')], 30, 52),
             ([curses.KEY_END], 37, 59), ([curses.KEY_HOME, curses.KEY_DOWN], 1, 23)):
         window.keys = keys
         assert not screen.wants_end()

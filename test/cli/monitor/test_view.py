@@ -232,10 +232,14 @@ def test_link_shows_load_and_poll_cycle() -> None:
 
 def test_stations_are_told_from_the_active_node_table_and_the_diagnostics() -> None:
     picture = snapshot(statuses=[ShownStatus('station 1', Style.GOOD, 'OK'), ShownStatus(
-        'station 22', Style.BAD, 'ERROR: station 22 inactive', {'last answer': '4.7 s ago'})])
+        'station 22', Style.BAD, 'ERROR: station 22 inactive', {
+            'last answer': '4.7 s ago', 'transactions without reply': '3', 'error replies': '0',
+            'processor': 'SLC', 'mode': 'RUN', 'faults': 'halted'})])
+    told = [line.split()[-1] for line in lines(picture)[-5:]]
+    assert told == ['ago', '3', 'SLC', 'RUN', 'halted']
     assert 'active stations: 1, 17' in '\n'.join(lines(picture))
     assert styles_of('  station 22   ERROR', picture) == [Style.BAD] * 2
-    assert line_with('last answer  4.7 s ago', picture).style is Style.PLAIN
+    assert line_with('4.7 s ago', picture).style is Style.PLAIN
     assert line_with('stations 1 OK, 22 silent', picture).style is Style.WARNING
     assert styles_of('stations 1 REM', snapshot(statuses=WITHHELD)) == [Style.WARNING]
     picture = snapshot(statuses=[ShownStatus('station 1', Style.GOOD, 'OK')])
