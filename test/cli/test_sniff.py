@@ -489,7 +489,7 @@ def test_files_are_whole_though_nobody_reads_the_output(tmp_path: Path, capture:
 
 @pytest.mark.parametrize('args, text', [
     (('ttyUSB0',), 'did you mean --port ttyUSB0? A FILE is a recording'),
-    (('/dev/ttyUSB99',), 'did you mean --port /dev/ttyUSB99? A FILE is a recording'),
+    (('/dev/tty',), 'did you mean --port /dev/tty? A FILE is a recording'),
     (('socket://127.0.0.1:1',), 'did you mean --port socket://127.0.0.1:1?'),
     (('--port', 'ttyUSB99'), 'ttyUSB99: No such file or directory; a device path is '
                              '/dev/ttyUSB99')])

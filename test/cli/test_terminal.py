@@ -142,11 +142,11 @@ def test_progress_elsewhere_comes_every_two_seconds(monkeypatch: pytest.MonkeyPa
     file = io.StringIO()
     monkeypatch.setattr('sys.stderr', file)
     progress = Progress()
-    for tenth in range(70):
+    for tenth in (*range(45), *range(85, 111)):
         clock[0] = 100 + tenth / 10
         progress.show(f'{tenth}')
     progress.clear()
-    assert file.getvalue() == '20\n40\n60\n'
+    assert file.getvalue() == '20\n40\n85\n105\n'
 
 
 def test_output_that_is_closed_takes_all(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -261,7 +261,8 @@ def test_port_that_cannot_be_opened_leads_to_the_cure(number: int, text: str) ->
     (['-s', '1'], '-s 1; did you mean --station?'),
     (['--baudrate=9600'], '--baudrate=9600; did you mean --baud?'),
     (['-p'], '-p; did you mean --port or --parity?'), (['--zzz'], '--zzz'),
-    (['more'], 'more; it takes only options'),
+    (['more'], 'more; it takes only options'), (['--porty'], '--porty; did you mean --port or '
+                                                '--parity?'),
     (['/dev/x'], '/dev/x; did you mean --port /dev/x?'),
     (['ttyS0'], 'ttyS0; did you mean --port ttyS0?')])
 def test_option_that_may_be_meant(

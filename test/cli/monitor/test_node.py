@@ -158,6 +158,9 @@ def test_only_the_statuses_of_the_node_count(bridge: Bridge, watch: NodeWatch) -
     until(watch, lambda picture: picture.is_there and bridge.diagnostics.get_subscription_count())
     bridge.status('cell/lines: lines', 'ERROR', DiagnosticStatus.ERROR, **{NAME: 'no port'})
     until(watch, lambda picture: picture.stopped == 'does not run: no port')
+    bridge.status('battery: level', 'OK', DiagnosticStatus.OK)
+    watch.spin_once(0.2)
+    assert watch.snapshot().stopped
     link = DiagnosticStatus(
         name='cell/line_a: link', message='WARN: slow', level=DiagnosticStatus.WARN,
         values=[KeyValue(key='settings', value='9600 baud')])
@@ -167,7 +170,7 @@ def test_only_the_statuses_of_the_node_count(bridge: Bridge, watch: NodeWatch) -
     bridge.diagnostics.publish(DiagnosticArray(status=others))
     picture = until(watch, lambda picture: picture.statuses)
     watch.spin_once(0.2)  # the others
-    assert watch.snapshot().told == picture.told
+    assert (picture.stopped, watch.snapshot().told) == ('', picture.told)
     found, = picture.statuses
     assert (found.section, found.message, found.style, found.values) == (
         'link', 'WARN: slow', Style.WARNING, {'settings': '9600 baud'})
@@ -197,7 +200,8 @@ def test_spare_of_the_same_name_does_not_hide_the_owner_of_the_line(
     until(watch, lambda picture: [status.section for status in picture.statuses] == ['standby'])
     with Observer() as host:  # its node comes after that of the spare in the graph of ROS
         (owner := Bridge(host)).read(make_mapping('N7:0', tag='speed'), [7], '/elsewhere/speed')
-        until(watch, lambda picture: '/elsewhere/speed' in heard(picture))
+        owner.read(make_mapping('N7:1', tag='own'), [8])
+        until(watch, lambda picture: {'own', '/elsewhere/speed'} <= {*heard(picture)})
         owner.node.destroy_node()
 
 

@@ -373,8 +373,8 @@ def test_bit_is_drawn_between_0_and_1() -> None:
 
 
 def test_bit_that_blinks_faster_than_the_steps_is_seen() -> None:
-    blinking = [(second / 4, [0, second % 2]) for second in reversed(range(40))]
-    assert drawn(*blinking, is_bits=True).strip() == '▁█▁█▁▁'
+    blinking = [(second / 4, [0, second % 2]) for second in reversed(range(1, 41))]
+    assert drawn(*blinking, is_bits=True).strip() == '▁█▁█▁█'
 
 
 def test_peak_within_a_step_is_seen() -> None:
