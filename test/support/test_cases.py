@@ -23,14 +23,6 @@ import sys
 import pytest
 from support.cases import for_all
 
-SESSION = """\
-from pathlib import Path
-from support.forked import Forked
-program = Forked(Path({!r}), [])
-print(program.stdout.readline(), end='', flush=True)
-program.wait()
-"""
-
 taken: list[tuple[int, str]] = []
 
 
@@ -78,10 +70,12 @@ def test_failure_is_named() -> None:
 
 
 def test_program_ends_with_the_killed_session_that_started_it(tmp_path: Path) -> None:
-    program = tmp_path / 'endless.py'
-    program.write_text('import os, time\nprint(os.getpid(), flush=True)\ntime.sleep(300)')
-    with subprocess.Popen([sys.executable, '-c', SESSION.format(str(program))],
-                          cwd=Path(__file__).parents[1], stdout=subprocess.PIPE) as session:
+    (tmp_path / 'endless').write_text(
+        'import os, time; print(os.getpid(), flush=True); time.sleep(300)')
+    code = (f'from support.forked import *; program = Forked(Path("{tmp_path}/endless"), []);'
+            'print(program.stdout.readline(), flush=True); program.wait()')
+    with subprocess.Popen([sys.executable, '-c', code], cwd=Path(__file__).parents[1],
+                          stdout=subprocess.PIPE) as session:
         ends = os.pidfd_open(int(session.stdout.readline()))  # type: ignore[union-attr]
         session.kill()
     assert select.select([ends], [], [], 20.0)[0]
