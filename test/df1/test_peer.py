@@ -333,6 +333,19 @@ def test_replies_of_a_gateway_in_place_of_a_station_are_counted_like_late_ones()
     assert seen == [(1, 0x02), (2, 0x07), (0, 0), (1, 0x02), (0, 0)]
 
 
+def test_second_command_goes_out_and_has_its_reply_while_the_first_waits() -> None:
+    peer = PeerBench(LinkSettings(station=None, max_outstanding=2))
+    peer.begin(COMMAND)
+    peer.said()
+    setattr(peer, 'next_due', lambda: peer.now + 0.5)
+    peer.hear(ACK)
+    assert peer.machine.next_call == peer.now + 0.5
+    task = peer.begin(later(COMMAND, 1))
+    peer.said()
+    assert peer.hear_packet(later(REPLY, 1)) == ACK  # before the ACK to its command
+    assert (task.result, peer.wait(1.5)) == (later(REPLY, 1), [])
+
+
 def test_short_wait_is_for_an_inactive_station() -> None:
     """Timeout counts for the answer of an active station, as on a half-duplex line."""
     peer, task = acknowledged()

@@ -282,12 +282,19 @@ def test_command_to_a_station_that_is_never_polled_ends_by_the_clock(number: int
 
 def test_group_is_filled_with_active_stations() -> None:
     rig = bench(PollingSettings((1, 2, 3, 4), (9,), group_size=2), dead=(1, 2))
-    rig.start(1, 2, run=1.0)
+    rig.start(1, 2, run=4.0)
     polls = [text for text in rig.master.said.split() if text not in ('P1', 'P2')]
     assert polls[:9] == 3 * ['P9', 'P3', 'P4']
+    silent = [text for text in rig.master.said.split() if text in ('P1', 'P2')]
+    assert silent[:4] == 2 * ['P1', 'P2']
     rig = bench(PollingSettings((1, 2, 5), group_size=1), dead=(2,))
     rig.start(2, run=1.0)
     assert rig[1].polls > 150  # groups of a silent station, or of the master, make no pause
+    rig = bench(PollingSettings((1, 5, 2), in_sequence=True))
+    for number in (1, 2) * 2:
+        rig.ask(number)
+    rig.start(run=0.2)
+    assert rig.master.said.split()[:8] == 2 * ['P1', 'C1', 'C2', 'P2']
 
 
 def test_fault_heard_while_probing_is_counted_and_told() -> None:

@@ -181,10 +181,11 @@ def test_silence_that_was_told_quickly_costs_what_it_took() -> None:
 
 
 def test_where_none_waits_nobody_is_put_off() -> None:
-    stations = ActiveStationList((1, 2), routes={1: 10, 2: 10}, probe_time=1.0)  # 10 has no rows
+    stations = ActiveStationList(  # 10 has no rows; half of the time this process stood still
+        (1, 2), routes={1: 10, 2: 10}, probe_time=1.0, took=lambda begun, now: (now - begun) / 2)
     stations.lost(1, 0.0)
     stations.tried(1, 0.0, 1.0, was_silent=False)
-    assert stations.probes.next == 8.0
+    assert stations.probes.next == 4.5
     stations.lost(2, 2.0)
     stations.tried(2, 1.0, 2.0, was_silent=False)
     assert stations.probes.next == 2.0
@@ -192,16 +193,21 @@ def test_where_none_waits_nobody_is_put_off() -> None:
 
 
 def test_station_that_replies_too_late_is_silent_and_one_that_is_polled_is_not_asked() -> None:
-    stations = ActiveStationList((1, 2, 3, 4), routes={4: 2}, probe_time=1.0)
-    stations[1].overdue = 2
+    stations = ActiveStationList((1, 2, 3, 4), routes={4: 2}, probe_time=1.0,
+                                 took=lambda begun, now: (now - begun) / 2)
+    for number in (1, 3, 4):  # only 2 waits, which has rows and is a gateway
+        stations[number].overdue = 2
     stations.tried(1, 3.0, 5.0, was_silent=True)
-    assert stations.probes.next == 19.0
+    assert stations.probes.next == 12.0
+    stations.polled_silent(5.0, 6.0)
+    assert stations.probes.next == 15.5
+    stations[3].overdue = 0
     stations.add((2,), are_polled=True)
     for lost, polled in ((4, [2]), (2, [2, 4])):  # who answers for 4 shows that it is back
         stations.lost(lost, 20.0)
         assert [number for number in (1, 2, 3, 4) if stations.is_polled(number)] == polled
     assert stations.claim_message(1, 20.0) and not stations.claim_message(2, 20.0)
-    for asker, free in ((Asker.IN_TURN, 19.0), (Asker.OWN, 27.0)):
+    for asker, free in ((Asker.IN_TURN, 15.5), (Asker.OWN, 23.5)):
         stations.tried(2, 19.0, 20.0, was_silent=True, asker=asker)
         assert stations.probes.next == free
 

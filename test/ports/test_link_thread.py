@@ -23,7 +23,6 @@ import os
 from pathlib import Path
 import queue
 import resource
-import socket
 import threading
 import time
 
@@ -294,26 +293,6 @@ def test_full_pty_is_a_lost_port(pty: Pty, link: Link, monkeypatch: pytest.Monke
         False, 'the port was lost: the line takes no data; is Handshake right?')
     assert script.machine.counters.read_errors == 0
     assert script.end().startswith('PortLost(')
-
-
-def test_machine_runs_on_a_socket_url(link: Link) -> None:
-    script = Script(Listen(None))
-    with socket.create_server(('127.0.0.1', 0)) as server:
-        server.settimeout(PATIENCE)
-        link.start(script.machine, f'socket://127.0.0.1:{server.getsockname()[1]}')
-        assert link.state().is_open
-        client, _ = server.accept()
-        with client:
-            client.settimeout(PATIENCE)
-            data = b''
-            while len(data) < 5:
-                data += client.recv(5)
-            assert data == READY
-            client.sendall(ACK)
-            assert script.next() == Control(Code.ACK)
-        assert link.state().text == 'the port was lost: the other end has closed the connection'
-        again, _ = server.accept()
-        again.close()
 
 
 def test_rule_6_clock_counts_a_suspend() -> None:

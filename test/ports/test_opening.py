@@ -126,11 +126,6 @@ def test_port_that_does_not_say_in_time_is_not_refused(monkeypatch: pytest.Monke
 Sockets = tuple[DescriptorPort, socket.socket]
 
 
-def test_read_ends_when_woken(sockets: Sockets, pipe: tuple[int, int]) -> None:
-    os.write(pipe[1], b'w')
-    assert sockets[0].read(None, pipe[0]) == b''
-
-
 def test_write_to_a_line_that_takes_no_more_does_not_hang(
         sockets: Sockets, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr('abdf1_ros.ports.descriptor.WRITE_TIMEOUT', 0.05)

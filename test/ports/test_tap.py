@@ -31,12 +31,11 @@ from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.serial_device import SerialDevice
 from abdf1_ros.ports.settings import PortSettings
-from abdf1_ros.ports.tap import is_pty, Tap
+from abdf1_ros.ports.tap import Tap
 from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.sniffer.capture import Chunk, Direction
 import pytest
 import serial
-from support.cases import for_all
 from support.counting import open_files
 from support.driver_bench import ListeningBench
 from support.mappings import make_mapping
@@ -294,13 +293,6 @@ def test_silence_is_told(ptys: list[Pty]) -> None:
 
         assert list(listening.chunks(PATIENCE, 0.01, idle)) == []
     assert len(told) == 3
-
-
-@for_all(('name', 'expected'), [
-    ('pty', True), ('pty:/tmp/x', True), ('/dev/ttyUSB0', False), ('socket://h:1', False),
-    ('ptys', False)])
-def test_word_pty_and_its_file_name_ask_for_a_pseudo_terminal(name: str, expected: bool) -> None:
-    assert is_pty(name) is expected
 
 
 def test_what_nothing_takes_is_passed_on_and_counted(

@@ -198,8 +198,12 @@ def test_place_that_cannot_be_opened_says_why_until_it_can(tmp_path: Path) -> No
         assert (tmp_path / 'hmi').read_text() == 'mine'
         (tmp_path / 'hmi').unlink()
         wait_for(lambda: not taken.fault)
-        with client_at(tmp_path / 'hmi') as client:
-            assert client.read('N7:1') == 1
+        for _ in range(2):  # also after a pause
+            with client_at(tmp_path / 'hmi') as client:
+                assert client.read('N7:1') == 1
+            wait_for(lambda: not taken.guest.is_connected)
+            taken.pause()
+            taken.start()
 
 
 class Waits:
