@@ -94,8 +94,8 @@ def test_times_of_a_mode_are_those_of_its_settings(
         mode: tuple[str, str], times: tuple[float, ...]) -> None:
     line = LinkSettings(timing=LineTiming(0.001, 0.25), nak_retries=4, enq_retries=2, timeout=0.5,
                         cmd_timeout=2.0, polling=PollingSettings((1,), in_sequence=True))
-    of, other = mode_of(*mode), replace(line, nak_retries=1, timeout=3.0,
-                                           polling=None, avoids_collisions=True)
+    of = mode_of(*mode)
+    other = replace(line, nak_retries=1, timeout=3.0, polling=None, avoids_collisions=True)
     assert times == pytest.approx((
         of.pause(line), of.longest_transaction(line, 1.0, 3.0, 2),
         of.undisturbed(line, 1.0, 0.125, 3.0, 2), of.longest_reply(line, 1.0),

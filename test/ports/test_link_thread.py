@@ -441,8 +441,12 @@ def test_machine_that_came_to_nothing_does_not_come_later(monkeypatch: pytest.Mo
     monkeypatch.undo()
     threading.Timer(0.15, port.free.set).start()
     assert thread.release()
+    port.free.clear()
     thread.take()
     assert port.is_used.wait(PATIENCE)  # by whatever machine there is now
+    monkeypatch.setattr('abdf1_ros.ports.link_thread.EXCHANGE_LIMIT', 0.0)
+    assert not thread.release()  # which has not happened a second time
+    port.free.set()
     thread.stop()
     assert after.ended.empty()
 
