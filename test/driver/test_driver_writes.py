@@ -87,15 +87,6 @@ def test_message_for_several_rows_waits_as_a_whole_or_not_at_all() -> None:
         'not written: refused: too many writes are waiting'] * 3
 
 
-def test_write_without_a_reply_is_a_failure_of_its_station() -> None:
-    row = make_mapping('N7:0', 'Write')
-    bench, plc = bench_of(row)
-    plc.faults.silent = True
-    bench.write(row, [1])
-    bench.run_until(lambda: bench.listener.results != [])
-    assert bench.driver.stations[1].failures == 1
-
-
 def test_write_that_comes_just_when_the_port_is_lost_is_refused() -> None:
     row = make_mapping('N7:0', 'Write')
     bench, _ = bench_of(row)

@@ -93,7 +93,7 @@ def test_rule_8_guests_write_over_a_fallback_is_written_over_at_once(dst: int) -
     cell.ask('N7:0', 99, dst)
     cell.bench.run_until(lambda: cell.word('N7:0') == 99)
     cell.bench.run_until(lambda: not row.stands)
-    assert row.state is FallbackState.OVERWRITTEN
+    assert (row.state, row.is_confirmed) == (FallbackState.OVERWRITTEN, False)
     cell.run(0.1)
     assert row.stands
     assert cell.written('N7:0', since)[-1:] == [7]
