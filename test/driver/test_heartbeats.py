@@ -70,7 +70,8 @@ def test_rule_1_counts_to_32767_and_begins_again_with_1() -> None:
 def test_rule_2_the_0_of_a_first_contact_stands_for_a_period_and_half_a_second(
         period: int) -> None:
     cell = Cell(beat_row(period))
-    assert cell.bench.driver.interlocks.heartbeats[0].why_not(cell.now)
+    beat, = cell.bench.driver.interlocks.heartbeats
+    assert beat.why_not(cell.now) == 'the PLC has not confirmed it yet'
     cell.run(2.0)
     zero, one = [when for when, _, value in cell.writes if value in (0, 1)]
     assert max(period / 1000, 0.5) < one - zero < max(period / 1000, 0.5) + 0.05
@@ -402,6 +403,8 @@ def test_rule_19_second_foreign_value_is_one_within_a_minute_or_20_periods() -> 
         assert told == [False, True, False]
         zeros = {other.next_zero() / period for _ in range(9)}
         assert len(zeros) == 9 and 0.5 <= min(zeros) < max(zeros) < 1.5
+        other.differ()
+        assert [other.take_extra_zero() >= period, other.take_extra_zero()] == [True, 0.0]
 
 
 def test_rule_19_0_that_stays_is_written_at_the_end_and_repeated_like_any_other() -> None:
