@@ -37,12 +37,6 @@ def point(publish: str = 'Always', **cells: str) -> ReadPoint:
     return ReadPoint(make_mapping(publish=publish, **cells), 0.1, 0.6)
 
 
-def test_value_is_waited_for_at_first() -> None:
-    new = point()
-    assert new.freshness(0.0) is new.freshness(1e9) is Freshness.WAITING
-    assert new.age(5.0) is None
-
-
 @for_all(('age', 'freshness'), [
     (0.0, Freshness.FRESH), (0.29, Freshness.FRESH), (0.31, Freshness.LATE),
     (0.6, Freshness.LATE), (0.61, Freshness.STALE), (1e6, Freshness.STALE)])
@@ -91,6 +85,7 @@ def test_usual_interval_follows_slowly_and_forgets_a_single_long_one() -> None:
 
 def test_failure_outweighs_age_and_ends_with_the_next_good_read() -> None:
     failing = point()
+    assert (failing.freshness(1e9), failing.age(5.0)) == (Freshness.WAITING, None)
     failing.fail('before the first')
     assert failing.freshness(0.0) is Freshness.FAILED
     failing.update(b'\1\0', 1.0)
