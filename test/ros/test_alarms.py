@@ -116,7 +116,8 @@ def test_check_names_the_rows() -> None:
 
 
 def test_bridge_reports_the_alarm_of_a_plc(tmp_path: Path) -> None:
-    rows = 'Tag,Command,Address,Station,PLC_Type,Alarm\ndoor,Read,B3:0/1,1,PLC5,ERROR\n'
+    rows = ('Tag,Command,Address,Station,PLC_Type,Alarm\nlamp,Read,B3:0/2,1,PLC5,\n'
+            'door,Read,B3:0/1,1,PLC5,ERROR\n')
     data = 'Station,PLC_Type,Address,Length,Values\n1,PLC5,B3:0,1,0\n'
     net = 'NAK_Retries,ENQ_Retries,Cmd_Timeout,Baud,Timeout\n1,1,5000,115200,3000\n'
 

@@ -129,7 +129,7 @@ def test_parameter_file_that_ros_would_refuse(tmp_path: Path, text: str, expecte
 def test_what_is_left_out_changes_nothing_else(tmp_path: Path) -> None:
     kept = "  a:\n    ros__parameters: {day: 2001-99-99, no-1: 010, text: '5', list: [1, 2]}\n"
     path = yaml_file(tmp_path, (
-        f'hall/press-plc:\n  ros__parameters: {{}}\nhall:\n  b-1: {{c: {{}}}}\n{kept}'))
+        f'hall/press-plc:\n  ros__parameters: {{}}\nhall:\n  "b\\xe9": {{c: {{}}}}\n{kept}'))
     given = ['--params-file', '/nowhere', *['--params-file', path] * 2, '-p', '--params-file']
     with usable_files(given, leaves_out=True) as (*first, usable, name, again, option, value):
         assert [*first, path, name, path, option, value] == given

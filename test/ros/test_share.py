@@ -63,8 +63,7 @@ def test_hmi_reads_and_writes_through_the_node(
     lines = capsys.readouterr().out.splitlines()
     guests = [line for line in lines if f'| guest pty:{place} |' in line
               and not line.endswith(('RETRANSMISSION', 'DUPLICATE'))]
-    # Four commands of it, and their replies.
-    assert len(guests) == 8
+    assert len(guests) == 8  # four commands of it, and their replies
     assert sum('write F8:4 = 30.5' in line for line in guests) == 1
     assert len([line for line in lines if ' command ' in line]) > 10
 

@@ -161,9 +161,9 @@ def test_line_that_is_left_goes_to_the_spare(pair: Pair) -> None:
 
 
 def test_spare_says_that_its_files_have_changed(pair: Pair) -> None:
-    pair.until_status('standby', OK)
+    pair.net.write_text(f'{NET}\n', encoding='utf-8')
     pair.map.write_text(ROWS.replace('N7:8', 'N7:9'), encoding='utf-8')
-    pair.until_status('standby', WARN, 'map.csv changed since read; restart this bridge')
+    pair.until_status('standby', WARN, 'net.csv, map.csv changed since read; restart this bridge')
 
 
 def test_line_that_is_lost_is_offered_no_longer(pair: Pair) -> None:
