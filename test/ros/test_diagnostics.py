@@ -338,9 +338,9 @@ def test_link_and_standby_tell_how_often_diagnostics_come(bench: Bench) -> None:
 
 def test_fault_is_logged_when_it_begins_and_again_after_it_was_over(bench: Bench) -> None:
     faults, stations = ['', LOST, LOST, '', LOST], bench.driver.stations
-    guest: Any = SimpleNamespace(guest=Guest('pty:a'), fault='')
+    guests: Any = [SimpleNamespace(guest=Guest(name), fault='') for name in ('pty:b', 'pty:a')]
     watches = watches_of(
-        bench.diagnostics.line, PORT, bench.seen, (guest,), lambda now: ['a'] * (now == NOW + 17),
+        bench.diagnostics.line, PORT, bench.seen, guests, lambda now: ['a'] * (now == NOW + 17),
         lambda now: ['b'] * (now == NOW + 17), lambda now: faults[int(now - NOW)])
 
     def look(now: float) -> list[str]:
@@ -359,7 +359,7 @@ def test_fault_is_logged_when_it_begins_and_again_after_it_was_over(bench: Bench
     stations.heard(1, NOW + 16)
     stations[1].returns = 0
     assert look(16.0) == ['station 1 answers commands']
-    guest.fault = 'in use'
+    guests[1].fault = 'in use'
     bench.driver.checks.heard(1, Identity(PlcType.SLC, 'SLC 5/03'), NOW)
     command = Packet(5, 2, 0x0F, 0, 7, b'\xAA')
     bench.driver.refused.add(command, command.reply(sts=0x10), NOW)

@@ -110,11 +110,11 @@ def test_files_are_shown_as_resolved_paths(
 
 
 def test_one_line_tells_what_the_node_runs_with(configured: Configured, files: Files) -> None:
-    write_csv(Path(files['map_file']), f'{MAP_HEADER},Topic,Period', [
-        *MAP, 'b,Write,N7:20,2,SLC,4,,,recipe,', 'c,Read,N7:30,2,SLC,1,,,,on demand'])
+    rows = [*MAP, 'b,Write,N7:20,2,SLC,4,,,recipe']
+    write_csv(Path(files['map_file']), f'{MAP_HEADER},Topic', rows)
     assert str(configured(port='/dev/ttyUSB0')) == (
         f'{files["net_file"]} and {files["map_file"]}: port /dev/ttyUSB0, Mode Master, 9600 '
-        'baud, CRC; 4 rows, topics: 3 to read, 1 to write')
+        'baud, CRC; 3 rows, topics: 2 to read, 1 to write')
 
 
 def test_no_path_and_no_port_forges_a_line_of_the_log(
