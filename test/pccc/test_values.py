@@ -186,7 +186,7 @@ def test_string_in_a_plc(text: str, words: str) -> None:
     ('\u0142', 3, "character '\u0142' does not exist in a PLC")])
 def test_string_that_cannot_be_written(text: str, words: int, error: str) -> None:
     with pytest.raises(FormatError) as caught:
-        encode_packed(text, words) if words else encode_counted(text)
+        Codec(ValueType.STRING, words or 1, packed=words > 0).check(text)
     assert str(caught.value) == error
     assert len(encode_packed('x' * 6, 3)) == 6
 

@@ -511,7 +511,7 @@ def test_length_of_a_range_counts_values_of_the_type(kind: str, length: int) -> 
     (SLC, 'T4:0.ACC-T4:2.ACC', ['T4:0.ACC', 'T4:1.ACC', 'T4:2.ACC', 'T4:0, and Length 9']),
     (SLC, 'T4:0.ACC{3}', ['T4:0.ACC', 'T4:1.ACC', 'T4:2.ACC', 'T4:0, and Length 9']),
     (PLC3, 'T:0.PRE-T:1.PRE', ['T:0.PRE', 'T:1.PRE', 'T:0.CTL, and Length 6']),
-    (SLC, 'HSC:0.ACC-HSC:1.ACC', ['HSC:0.ACC', 'HSC:1.ACC']),
+    (SLC, 'HSC:0.ACC-HSC:1', ['HSC:0.ACC', 'HSC:1.ACC']),
     (SLC, 'ST9:0-4', ['ST9:0', 'ST9:1', 'ST9:2', '...', 'ST9:4']),
     (SLC, 'ST9:0{2}', ['ST9:0', 'ST9:1']), (SLC, 'I:1.1{3}', ['I:1.1, and Length 3']),
     (SLC, 'I:1-4', ['I:1.0', 'I:2.0', 'I:3.0', 'I:4.0']),
