@@ -236,8 +236,8 @@ def test_unknown_processor_is_named_and_not_interpreted() -> None:
     data = bytearray(SLC)
     data[3], data[5:16] = 0x95, b'1769-L35E  '
     identity = decode_identity(bytes(data))
-    assert (str(identity), identity.mode, identity.faults) == (
-        '1769-L35E series B revision 3', None, ())
+    assert (str(identity), identity.mode, identity.faults, identity.interface) == (
+        '1769-L35E series B revision 3', None, (), 0x34)
     data[5:16] = bytes(11)
     assert str(decode_identity(bytes(data))) == 'processor 0x95 series B revision 3'
 

@@ -254,7 +254,7 @@ def test_rule_13_misspelt_tag_is_told_with_the_right_name(timeout: str) -> None:
 def test_rule_13_misspelt_run_is_not_taken_for_a_tag(text: str) -> None:
     told, = faults(row(**DOORS | {'While_Timeout': '', 'While': text}))
     assert f'(While): Item: 1, "{text}" is not RUN: did you mean RUN?' in told
-    assert faults(row(**DOORS | {'While': text}), row(**COUNTER | {'Tag': text})) == []
+    assert not faults(row(**DOORS | {'While': text}), row(**COUNTER | {'Tag': text, 'Period': ''}))
 
 
 def test_rule_14_timeout_has_no_default_and_allows_three_reads() -> None:
