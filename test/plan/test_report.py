@@ -252,13 +252,6 @@ def test_file_of_a_plc_has_one_type() -> None:
         'I:1.0', 'O:1.0', 'PTO:0.OUT')]), RemarkKind.STATION) == []
 
 
-def test_several_stations_in_full_duplex() -> None:
-    mappings = [make_mapping('N7:0', station=station, item=station) for station in (1, 3)]
-    assert texts(report_of(*mappings), RemarkKind.STATION) == []
-    assert 'the map has stations 1, 3' in texts(report_of(*mappings, mode='Peer'),
-                                                RemarkKind.STATION)[0]
-
-
 def test_gap_that_costs_a_second_read() -> None:
     report = report_of(make_mapping('N7:0', kind='int32', item=1), make_mapping('N7:200', item=2),
                        make_mapping('N7:5', item=3), make_mapping('N7:400', period=5000))
