@@ -70,6 +70,7 @@ FAULTS = [(target, habit, name) for targets, habit, name in [
     (ALL, Habit.DOUBLES_CHECK, 'check-not-doubled'), (ALL, Habit.REPLY_WITHOUT_BIT, 'read-words'),
     (ALL, Habit.KEEPS_ADDRESSES, 'read-words'), (ALL, Habit.ADDS_BYTE_TO_ECHO, 'echo-sizes'),
     (ALL, Habit.ALWAYS_STS, 'identity'), (ALL, Habit.ALWAYS_STS, 'element-too-high'),
+    (ALL, Habit.ALWAYS_STS, 'unknown-command'), (ALL, Habit.ALWAYS_STS, 'unknown-function'),
     (ALL, Habit.WORDS_REVERSED, 'word-order'),
     (ALL, Habit.WRITES_FIRST_WORD_ONLY, 'write-and-read'),
     (ALL, Habit.READS_NEXT_WORD, 'write-and-read'), (ALL, Habit.BYTES_EXCHANGED, 'write-and-read'),

@@ -59,7 +59,7 @@ Habit = Enum('Habit', [
     'REPLY_WITHOUT_BIT',  # 6 of CMD
     'KEEPS_ADDRESSES',  # of the command, in the reply
     'ADDS_BYTE_TO_ECHO', 'ACKS_TWICE',
-    'ALWAYS_STS',  # 10
+    'ALWAYS_STS',  # 50
     'WORDS_REVERSED', 'WRITES_FIRST_WORD_ONLY', 'READS_NEXT_WORD',
     'BYTES_EXCHANGED',  # of words that are written
     'REPEATS_CUT',  # a message without its last byte
@@ -351,7 +351,7 @@ class _Executor:
         if fnc == b'\xA2' and has(Habit.WORDS_REVERSED):
             reply = reply[:6] + _reversed(reply[6:])
         if has(Habit.ALWAYS_STS):
-            reply = self._done(data, sts=0x10)
+            reply = self._done(data, sts=0x50)
         if has(Habit.REPLY_WITHOUT_BIT):
             reply = reply[:2] + bytes((cmd,)) + reply[3:]
         if has(Habit.KEEPS_ADDRESSES):
