@@ -163,11 +163,11 @@ def test_errors_are_those_of_the_bridge(port: str) -> None:
 def test_many_addresses_are_read_by_the_plan(port: str, plcs: PlcPair) -> None:
     store(plcs[0], 'N7:0', [*range(100, 120)])
     store(plcs[0], 'T4:1', [0, 7, 5])
-    wanted = ['N7:9', 'B3:0/1', 'N7:0-2', 'F8:1', 'N7:12', 'T4:1.ACC', 'N7:5-5', 'T4:1-1']
+    wanted = ['N7:9', 'B3:0/1', 'N7:0-2', 'F8:1-2', 'N7:12', 'T4:1.ACC', 'N7:5-5', 'T4:1-1']
     with client(port, plc_type='SLC') as plc:
         assert plc.read_many(wanted) == {
-            'N7:9': 109, 'B3:0/1': False, 'N7:0-2': [100, 101, 102], 'F8:1': 0.0, 'N7:12': 112,
-            'T4:1.ACC': 5, 'N7:5-5': [105], 'T4:1-1': [0, 7, 5]}
+            'N7:9': 109, 'B3:0/1': False, 'N7:0-2': [100, 101, 102], 'F8:1-2': [0.0, 0.0],
+            'N7:12': 112, 'T4:1.ACC': 5, 'N7:5-5': [105], 'T4:1-1': [0, 7, 5]}
         assert plc.counters.commands_sent == 4  # N7, B3, F8, T4
         assert list(plc.read_many(reversed(wanted))) == wanted[::-1]
         assert plc.read_many([]) == {}
