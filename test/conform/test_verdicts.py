@@ -521,11 +521,14 @@ def test_reply_that_overtakes_its_ack_is_the_reply() -> None:
     command = end.command()
     reply = bytes((command[1], command[0], 0x46, 0)) + command[4:]
     line.data = end.frame(reply) + codec.ACK
-    assert (end.offer(command), line.sent) == (Symbol(
-        SymbolKind.ACK, codec.ACK, at=line.now), end.frame(command))
+    assert (end.offer(command), line.sent, end.owed) == (Symbol(
+        SymbolKind.ACK, codec.ACK, at=line.now), end.frame(command), {command[4:6]})
     line.data = b''
     assert end.collect() == reply
     assert line.sent == end.frame(command) + codec.ACK
+    assert (end.owed, end.further(0.1)) == (set(), None)
+    line.data = codec.ACK
+    assert end.offer(command) and end.owed == {command[4:6]}
 
 
 def test_enquiry_gets_the_last_response() -> None:
