@@ -172,11 +172,6 @@ def test_symbols_of_rslogix_become_rows_and_the_rest_is_told(tmp_path: Path) -> 
     assert not any(mapping.remarks for mapping in mappings)
 
 
-def test_all_five_descriptions_of_rslogix_are_kept(tmp_path: Path) -> None:
-    row = '"N7:0","Global","SPEED","one","two","three","four","five","no more"\n'
-    assert imported(tmp_path, row)[0][0].description == 'one two three four five'
-
-
 def test_what_is_not_about_an_address_is_counted(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     rows = RSLOGIX + ('"DFILE:N7","","","Numbers"\n"S:1/15","Global","","First Pass"\n'

@@ -60,13 +60,6 @@ def test_peer_is_full_duplex_and_by_radio_a_timeout_is_for_the_reply() -> None:
         (300, Network().cmd_timeout), (150, 150), (200, Network().cmd_timeout), (90, 90)]
 
 
-def test_gateway_has_an_address_in_half_duplex_that_is_not_ours() -> None:
-    with pytest.raises(ConfigurationError, match='--via: in full duplex a gateway has no address'):
-        line_of('--port', '1', '--peer', '--via', '8')
-    with pytest.raises(ConfigurationError, match='--via: 5 is our own Station, not a gateway'):
-        line_of('--port', '1', '--via', '5')
-
-
 def test_options_go_before_the_file(tmp_path: Path) -> None:
     path = write_csv(tmp_path / 'net.csv', 'Mode,Baud,Error_Code,Com_Port,Polling',
                      ['Peer,19200,BCC,/dev/ttyS7,Standard'])
