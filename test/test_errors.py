@@ -133,6 +133,7 @@ def test_text_takes_as_many_arguments_as_it_has_places(message: Message) -> None
 
 @for_all(('shown', 'text'), [
     (age_text(5.0, 4.9), '0.0 s'), (cut('abcdef', 2), '..'), (milliseconds(0.0), '0 ms'),
+    (cut('abcde', 5), 'abcde'),
     (utc_text(1.5), '1970-01-01T00:00:01.500+00:00'),
     (Message.ERR_BAD_CRC.text(0x0A, 0xFF, 0, 1),
      'Response with wrong CRC (actual=0x0aff, expected=0x0001)'),

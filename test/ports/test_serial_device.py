@@ -251,8 +251,8 @@ def test_all_nodes_of_a_device_are_one_line() -> None:
     assert usb == number_of(status_of(188, 0, mount=41, inode=7))
     assert usb != number_of(status_of(188, 1, mount=6, inode=91))
     # A container has pseudo-terminals of its own with these numbers.
-    assert number_of(status_of(136, 3, mount=24, inode=6)) != number_of(
-        status_of(136, 3, mount=55, inode=6))
+    assert number_of(status_of(143, 300, mount=24, inode=6)) != number_of(
+        status_of(143, 300, mount=55, inode=6))
     assert not number_of(os.stat('/tmp'))
 
 
