@@ -145,6 +145,7 @@ def test_node_of_the_test_needs_no_context(abdf1_cell: Cells) -> None:  # noqa: 
 def test_log_of_a_bridge_has_all_starts_and_its_end_is_shown(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     class Told:
+        poll = staticmethod(int)  # its exit status is 0
 
         def __init__(self, words: object, stdout: BinaryIO, stderr: object) -> None:
             stdout.write(b''.join(b'line %d\n' % number for number in range(8)))
@@ -157,6 +158,8 @@ def test_log_of_a_bridge_has_all_starts_and_its_end_is_shown(
     bridge.start()
     assert bridge.last_words().splitlines()[1:] == [
         'line 6', 'line 7', *(f'line {number}' for number in range(8))]
+    with pytest.raises(AssertionError, match='the bridge has ended with 0; its last words:'):
+        bridge.check()
 
 
 def test_program_of_a_ladder_runs_in_the_station_that_is_named(tmp_path: Path) -> None:
