@@ -103,10 +103,10 @@ def mappings_of(address: str, cells: MappingType[str, str], item: int = 1) -> li
     runs = [run for element in elements for run in named_runs(element)]
     if not runs:
         return [mapping_of(address, cells, item)]
-    first, last = elements[0], elements[-1]
+    first = elements[0]
     if len(runs) == len(elements) and runs[0][1] == first.layout.words:
         runs = [(first, len(elements) * first.layout.words, 1)]
-    wide = ValueType.INT32 if last.file_type.is_function else ValueType.FLOAT32
+    wide = ValueType.INT32 if first.file_type.is_function else ValueType.FLOAT32
     return [replace(mapping_of(str(place), {
         **cells, 'Length': str(count), 'Type': (wide if words > 1 else ValueType.INT16).value},
         item), remarks=()) for place, count, words in runs]
