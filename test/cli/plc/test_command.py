@@ -99,7 +99,7 @@ def test_ping_of_which_one_fails_is_a_failure(plc: Plc, monkeypatch: pytest.Monk
     monkeypatch.setattr('abdf1_ros.cli.plc.presence.ping', Mock(side_effect=[
         FormatError('other bytes came'), 0.001, *[KeyboardInterrupt] * 2, PortLost('gone')]))
     said = plc('ping', '1', '--count', '9')
-    assert (said.status, said.lines[1][:19]) == (1, '2 sent, 1 answered;')
+    assert (said.status, said.lines[1][:42]) == (1, '2 sent, 1 answered; shortest 1.0, mean 1.0')
     assert plc('ping', '1') == Said(1, '0 sent, 0 answered\n', '')
     assert plc('ping', '1') == Said(1, '', 'plc: port lost: gone\n')
 
@@ -196,7 +196,7 @@ def test_commands_work_over_a_tcp_connection(files: Files, capsys: Output) -> No
         assert call(main, capsys, 'read', 'N7:0', '--port', url, *PATIENT).lines == ['N7:0 1200']
         said = call(main, capsys, 'detect', '--port', url, '--parity', 'Even', '--stations',
                     '1', *PATIENT)
-    assert said.lines[1].endswith(f'--port {url} --baud 9600 --check CRC --parity Even')
+    assert said.lines[1].endswith(f' 1 --port {url} --baud 9600 --check CRC --parity Even')
     assert said.lines[-1] == f'5,Master,CRC,{url},9600,Even,300'
 
 
