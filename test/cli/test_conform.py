@@ -30,6 +30,7 @@ from abdf1_ros.conform.case import Case, CaseResult, Permission, Verdict
 from abdf1_ros.conform.wire import Wire
 from abdf1_ros.df1.frames import Damaged
 from abdf1_ros.errors import Abdf1Error
+from abdf1_ros.pccc.families import decode_identity
 import pytest
 from support.cases import for_all
 from support.commands import Output, running_simulator
@@ -96,24 +97,25 @@ def test_failures_skips_noise_and_early_enquiries_are_told(
         port: str, capsys: Output, monkeypatch: pytest.MonkeyPatch) -> None:
     def results(cases: Sequence[Case], wire: Wire, end: object,
                 allowed: frozenset[Permission]) -> Iterator[CaseResult]:
-        assert allowed == permissions
+        assert (allowed, wire.answer_time) == (permissions, 1.5)
         wire.noise, wire.enquired_after, wire.has_heard = 3, 1.78, True
         yield CaseResult(cases[0], Verdict.FAIL, 0.1, 'ACK', 'NAK', ('we   10 05',))
         yield CaseResult(cases[0], Verdict.SKIP, got='needs a word')
-        yield CaseResult(cases[0], Verdict.PASS)
 
     monkeypatch.setattr('abdf1_ros.cli.conform.run_cases', results)
+    unknown = Mock(return_value=decode_identity(b'\xEE\x34'))
+    monkeypatch.setattr('abdf1_ros.cli.conform.decode_identity', unknown)
     permissions = {*Permission}
     for options, missing, *told in (
             (['--yes', '--words', 'N7:0'], set(), 'we   10 05\n', ' skipped: needs a word\n'),
             (['--yes', '--report'], {Permission.WRITE}, ' | expected ACK, got NAK |'),
-            (['--report'], {Permission.RESET}, ' | needs a word |')):
+            (['--report'], {Permission.RESET}, ' | needs a word |', ': unknown processor\n')):
         permissions -= missing
-        assert main(['slave', '--port', port, *options]) == 1
+        assert main(['slave', '--port', port, '--answer-time', '1.5', *options]) == 1
         said = capsys.readouterr()
         assert all(text in said.out for text in told)
         assert 'conform: 3 bytes outside of any symbol were' in said.err
-        assert '--answer-time 1 that may look like a fault: try --answer-time 0.8\n' in said.err
+        assert '--answer-time 1.5 that may look like a fault: try --answer-time 0.8\n' in said.err
 
 
 def test_damaged_character_is_not_an_answer(

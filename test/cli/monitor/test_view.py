@@ -234,9 +234,8 @@ def test_stations_are_told_from_the_active_node_table_and_the_diagnostics() -> N
     picture = snapshot(statuses=[ShownStatus('station 1', Style.GOOD, 'OK'), ShownStatus(
         'station 22', Style.BAD, 'ERROR: station 22 inactive', {
             'last answer': '4.7 s ago', 'transactions without reply': '3', 'error replies': '0',
-            'processor': 'SLC', 'mode': 'RUN', 'faults': 'halted'})])
-    told = [line.split()[-1] for line in lines(picture)[-5:]]
-    assert told == ['ago', '3', 'SLC', 'RUN', 'halted']
+            'processor': 'SLC', 'mode': 'RUN', 'faults': 'stop'})])
+    assert [line.split()[-1] for line in lines(picture)[-5:]] == ['ago', '3', 'SLC', 'RUN', 'stop']
     assert 'active stations: 1, 17' in '\n'.join(lines(picture))
     assert styles_of('  station 22   ERROR', picture) == [Style.BAD] * 2
     assert line_with('4.7 s ago', picture).style is Style.PLAIN
