@@ -120,7 +120,7 @@ def test_until_signals_are_handled_little_is_imported() -> None:
     assert not imported_by('import abdf1_ros.__main__') & slow
 
 
-@pytest.mark.parametrize('name', ['check', 'plan', 'sniff'])
+@pytest.mark.parametrize('name', ['check', 'sniff'])
 def test_pictures_are_imported_where_they_are_drawn(name: str) -> None:
     pictures = {f'abdf1_ros.cli.{module}' for module in (
         'lanes', 'check_picture', 'overhearing', 'sniff_picture', 'sniff_report')}
