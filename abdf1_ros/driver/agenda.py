@@ -16,8 +16,8 @@
 The one place that decides which job has the line next.
 
 Heartbeats and fallbacks (``interlocks``) go first. A check or read has its turn after
-``OWN_IN_A_ROW`` of them, and after each of them to a silent station, but not at the end. Then
-there are three queues:
+``OWN_IN_A_ROW`` of them, and after each of them to a silent station. At the end no check or read
+goes before all PLCs that answer have confirmed theirs. Then there are three queues:
 
 - ``writes`` go first, but after ``MAX_WRITES_IN_A_ROW`` of their commands a check or read that is
   due has its turn. A word that is rewritten is read and written back without another turn between:
@@ -175,8 +175,7 @@ class Agenda:
 
     def _own_first(self, now: float, busy: Container[int]) -> Job | None:
         """Return the next job: own writes first, not counted as ``writes`` in a row (rule 11)."""
-        if self._interlocks.is_ending:
-            # A read of a PLC that fails now could take all the time that is left (rule 5).
+        if self._interlocks.is_ending:  # no read has a turn now (rule 5)
             self._own_in_a_row, self._was_silent = 0, False
         if self._own_in_a_row >= OWN_IN_A_ROW and not self._interlocks.is_beats_turn(now):
             if busy and self._last_read is not None and self._last_read not in busy:
@@ -223,6 +222,9 @@ class Agenda:
         has_guests = has_guests and not is_held
         if has_guests and self._share.is_turn and (guest := self._guest(now, busy)):
             return guest
+        if self._interlocks.keeps_line:
+            self._is_reads_turn = False
+            return self._refresh(now, busy) or has_writes and self._write(now, busy) or None
         if self._stations.probes.died_at > -math.inf and (late := self._after_death(now, busy)):
             return late
         job = self._checks.find_due(now) and self._check(now, busy) \
@@ -322,6 +324,8 @@ class Agenda:
 
     def next_due(self) -> float:
         """Return when the next job is due (clock value in s), infinite for never."""
+        if self._interlocks.keeps_line:
+            return self._interlocks.next_due()
         due = min(self._reads.next_due(), self._checks.next_due, self._held_until)
         if not self._tasks.is_heard and self._questions >= _QUICK_QUESTIONS:
             due = max(due, self._next_question)

@@ -110,9 +110,10 @@ def test_rules_5_and_8_message_over_a_fallback_that_is_due_puts_none_off(event: 
 
 @pytest.mark.parametrize('is_followed', [False, True])
 def test_rule_5_end_waits_for_the_second_write_of_rule_10(is_followed: bool) -> None:
-    """A gateway delivers 0.9 s later what it has called undelivered."""
+    """A gateway delivers 0.9 s later what it has called undelivered; another PLC dies then."""
     speed = make_mapping('N7:0', 'Write', tag='speed', fallback=FALLBACK, via=7)
-    cell = Cell(speed, start=False)
+    cell = Cell(speed, make_mapping('N7:9', station=2, period=20), start=False)
+    faults = cell.bench.plc(2, 'PLC5', ('N7:0', 20)).faults
     cell.put_behind_gateway(run=6.0)
 
     def is_held(command: Packet) -> bool:
@@ -126,7 +127,8 @@ def test_rule_5_end_waits_for_the_second_write_of_rule_10(is_followed: bool) -> 
     if is_followed:
         cell.publish(speed, 5, run=0.05)
         assert cell.results()[-1] == 'written'
-    end(cell)
+    cell.bench.at(cell.now + 0.9, lambda: setattr(faults, 'silent', True))
+    end(cell, 1.05)
     assert cell.word('N7:0') == 7
 
 

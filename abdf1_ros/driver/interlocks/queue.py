@@ -130,6 +130,17 @@ class Interlocks(WriteListener):
             or row.tried < self.conditions.ended
             for row in self._plc_of if not row.is_confirmed)
 
+    @property
+    def keeps_line(self) -> bool:
+        """
+        Tell whether nothing may be read: it is the end, and a PLC that answers has not confirmed.
+
+        A read of a PLC that fails could take all the time that is left, also before a second write
+        that is not due yet (rules 5, 10).
+        """
+        return self.conditions.are_all_due and any(
+            plc.is_active and not row.is_confirmed for row, plc in self._plc_of.items())
+
     def unconfirmed(self) -> list[str]:
         """Return the tags of rows that are not confirmed at the end, or may be overwritten."""
         now = self._writing.record.line.now
