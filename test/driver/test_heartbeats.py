@@ -266,6 +266,8 @@ def test_rule_3d_topic_that_comes_wakes_nobody_while_a_late_plc_has_to_wait() ->
     assert driver.interlocks.heartbeats[0].state is BeatState.COUNTS
     assert driver.next_task(cell.now) is None
     assert driver.next_due() > cell.now
+    driver.interlocks.beats_gave_way()
+    assert not driver.interlocks.is_beats_turn(cell.now)
 
 
 def test_rule_3d_message_that_a_fallback_has_overruled_does_not_count() -> None:

@@ -120,6 +120,11 @@ class Plc:
         """Tell whether its station is active."""
         return self._stations[self.station].active
 
+    @property
+    def answers(self) -> bool:
+        """Tell whether it has answered the last of our own writes, and answers in time."""
+        return not self.failures and self._stations[self.station].replies_in_time
+
     def plan(self) -> None:
         """Plan the next look at its rows, at the earliest ``due`` of them."""
         self.due = min([row.due for row in self.rows], default=math.inf)
@@ -231,10 +236,9 @@ class Plc:
             return (1, 1, row.tried) if row.tried < conditions.ended else None
         is_zero = isinstance(row, HeartbeatRow) and row.wants_zero
         is_beat = isinstance(row, HeartbeatRow) and not row.wants_zero
-        is_ill = self.failures > 0 or not self._stations[self.station].replies_in_time
         if row.is_first_try and not is_beat:
-            return 0, is_ill, not is_zero
-        if not is_ill:
+            return 0, not self.answers, not is_zero
+        if self.answers:
             if isinstance(row, FallbackRow) and row.stands:
                 had_turn = now if conditions.is_beats_turn else conditions.gave_way
                 return 2, max(row.words.again_at, had_turn), row.tried

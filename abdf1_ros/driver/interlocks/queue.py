@@ -310,9 +310,10 @@ class Interlocks(WriteListener):
         self.conditions.is_beats_turn = True
 
     def is_beats_turn(self, now: float) -> bool:
-        """Tell whether a heartbeat is due that has given way already."""
+        """Tell whether a heartbeat of a PLC that answers is due, and has given way already."""
         return self.conditions.is_beats_turn and any(
-            beat.due <= now and not beat.wants_zero for beat in self.heartbeats)
+            beat.due <= now and not beat.wants_zero and self._plc_of[beat].answers
+            for beat in self.heartbeats)
 
     def refresh(self, now: float, busy: Container[int] = ()) -> WriteJob | None:
         """
