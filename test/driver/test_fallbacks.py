@@ -601,6 +601,16 @@ def test_rule_10_heartbeat_counts_after_a_0_that_is_written_once_more() -> None:
     assert beat.next_beat == 9.0 + 0.5 + 0.2 * Random(0).randint(1, 7)  # unlike another bridge
 
 
+def test_rule_10_0_is_written_once_more_also_where_the_heartbeat_may_count_by_then() -> None:
+    beat = HeartbeatRow(OneRow().record.words_of(beat_row(5000)), 1, Random(0))
+    for begun, why in (0.0, ''), (5.2, ''), (6.0, 'no message'):  # 0, a number, and 0 again
+        assert beat.judge(begun, why, begun, {})
+        beat.take(begun)
+        beat.words.may_land(('a number',), begun + 2.0)
+        beat.ended(Outcome.WRITTEN, begun + 0.1)
+    assert [beat.judge(now, '', now, {}) for now in (6.5, 7.9, 8.0)] == [False, False, True]
+
+
 def test_rule_10_why_the_plc_refuses_is_told_once() -> None:
     cell = Cell(beat_row(), speed_row())
     cell.refused = {'N7:0', 'N10:0'}

@@ -233,12 +233,12 @@ class HeartbeatRow:
         ``executor`` is when the executor ran last.
         """
         self.reason, self._holds_at = why_held, self.topics_until(messages)
+        if not why_held and self.state is BeatState.HELD and self.is_at_rest:
+            self.state = BeatState.SHOWN
         if self.state is BeatState.SHOWN and now >= self.next_beat:
             self.state = BeatState.COUNTS
         if why_held:
             self.hold()
-        elif self.state is BeatState.HELD and self.is_at_rest:  # the PLC had to see the 0 first
-            self.state = BeatState.COUNTS
         if self.is_under_way:
             self.due = math.inf
         elif self.wants_zero and self.is_at_rest and now >= self.words.again_at:
