@@ -126,7 +126,7 @@ class WriteListener:
         """Take a write that has ended."""
 
     def write_expired(self, write: Write) -> None:
-        """Take a message that was too old to have the line."""
+        """Take a message that has ended before it had the line."""
 
 
 class WordsListener(Protocol):
@@ -294,6 +294,6 @@ class WriteRecord:
         return [words for row, words in self._words.items() if claim.meets(row.extent)]
 
     def expired(self, write: Write) -> None:
-        """Tell the listeners that a message was too old to have the line."""
+        """Tell the listeners that a message has ended before it had the line."""
         for listener in self._listeners:
             listener.write_expired(write)

@@ -257,6 +257,18 @@ def test_rule_7_fallback_waits_no_longer_for_a_message_that_has_expired(
         'not written: not sent: waited longer than 0.5 s for the line', TIMEOUT]
 
 
+def test_rule_7_fallback_waits_no_longer_for_a_message_that_an_unheard_connection_ends(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    speed = speed_row(Fallback((7,), 2000))
+    cell = Cell(speed, make_mapping('N7:9'), run=1.0, may_store=True)
+    cell.publish(speed, 3, run=1.9)
+    monkeypatch.setattr(WriteQueue, 'next', lambda queue, now, busy: None)
+    cell.publish(speed, 4, run=0.2)
+    cell.bench.far.say = lambda data: b''
+    cell.run(1.0)
+    assert cell.written('N7:0') == [7, 3, 7]
+
+
 def test_rule_7_message_that_is_older_than_fallback_after_is_not_sent() -> None:
     cell, speed = speed_cell()
     cell.bench.write(speed, [3], run=1.0, age=0.6)

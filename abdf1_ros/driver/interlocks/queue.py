@@ -248,7 +248,7 @@ class Interlocks(WriteListener):
             self._own_ended(claim, write, now)
 
     def write_expired(self, write: Write) -> None:
-        """Let the fallback stop waiting for a message that was too old to have the line."""
+        """Let the fallback stop waiting for a message that has ended before it had the line."""
         if write.mapping in self._by_mapping:
             row = self._by_mapping[write.mapping]
             self._plc_of[row].look_again(row)

@@ -175,8 +175,7 @@ class WriteQueue:
         self.next_expiry = math.inf
         for write in list(self.waiting):
             if reason := self._reject_reason(write, now):
-                self._end(write, Outcome.NOT_SENT, reason, now)
-                self._writing.record.expired(write)
+                self._refuse(write, reason, now)
                 continue
             patience = self.patience_of(write.mapping)
             if now >= write.oldest + patience:
@@ -195,7 +194,12 @@ class WriteQueue:
         """End the waiting writes, of one mapping or all, without sending them."""
         dropped = [write for write in self.waiting if mapping in (None, write.mapping)]
         for write in dropped:
-            self._end(write, Outcome.NOT_SENT, reason, now)
+            self._refuse(write, reason, now)
+
+    def _refuse(self, write: Write, reason: str, now: float) -> None:
+        """End a write that must not be sent any more: a fallback may have waited for it."""
+        self._end(write, Outcome.NOT_SENT, reason, now)
+        self._writing.record.expired(write)
 
     def _end(self, write: Write, outcome: Outcome, detail: str, now: float) -> None:
         """End a write that waits, without sending it."""
