@@ -222,7 +222,7 @@ class Agenda:
         has_guests = has_guests and not is_held
         if has_guests and self._share.is_turn and (guest := self._guest(now, busy)):
             return guest
-        if self._interlocks.keeps_line:
+        if self._has_own and self._interlocks.keeps_line:
             self._is_reads_turn = False
             return self._refresh(now, busy) or has_writes and self._write(now, busy) or None
         if self._stations.probes.died_at > -math.inf and (late := self._after_death(now, busy)):
@@ -324,7 +324,7 @@ class Agenda:
 
     def next_due(self) -> float:
         """Return when the next job is due (clock value in s), infinite for never."""
-        if self._interlocks.keeps_line:
+        if self._has_own and self._interlocks.keeps_line:
             return self._interlocks.next_due()
         due = min(self._reads.next_due(), self._checks.next_due, self._held_until)
         if not self._tasks.is_heard and self._questions >= _QUICK_QUESTIONS:
