@@ -234,6 +234,7 @@ def test_port_that_cannot_be_opened_is_one_and_what_is_wrong_in_options_two(
     ['slave', '--station', '255'], ['slave', '--count', '0'], ['slave', '--count', '42'],
     ['slave', '--answer-time', '30.1'], ['slave', '--timeout', '300'],
     ['slave', '--tcp', 'nowhere'], ['slave', '--tcp', 'a:99999'], ['slave', '--pty=x', '--port=y'],
+    ['slave', '--tcp=a:1', '--port=/x'],
     ['peer', '--words', 'F8:0'], ['peer', '--echo'], ['slave', '--duplex', 'half'], []])
 def test_usage_is_shown_for_impossible_options(args: list[str]) -> None:
     with pytest.raises(SystemExit) as end:

@@ -195,7 +195,7 @@ def _refused(capsys: Output, *options: str, status: int = 2) -> str:
 @for_all(('options', 'status', 'text'), [
     *(((f'--at={at}',), 2, f'--at "{at}" should be seconds from 0 and a command, as in "5 silent '
        '1"') for at in ('soon silent 1', 'silent 1', '', 'x', '-1 silent 1', 'nan silent 1',
-                        'inf silent 1', '1_0 silent 1', '\u0661 silent 1', '5', '5 ')),
+                        'inf silent 1', '1_0 silent 1', '\u0661 silent 1', '5', '5  ')),
     *(((f'--tcp={where}',), 2, f'--tcp "{where}" should be HOST:PORT') for where in (
         '127.0.0.1', 'x', ':', '127.0.0.1:99999', ':-1', 'a:b', 'é..b:80')),
     (('--at', '5 hush 1'), 2, '--at: "hush 1" is not a command'),
