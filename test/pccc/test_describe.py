@@ -44,7 +44,7 @@ def command(data: str, cmd: int = 0x0F) -> Packet:
     ('AB 02 03 85 01 00 08 00 08 00', 'masked write B3:1 mask 0008 = 0008'),
     ('68 00 00 0A 00 07 00 07 00 0A 00', 'typed read N7:0, 10 elements'),
     ('68 00 00 01 00 0F 00 04 02 02 01 00', 'typed read T4:2.ACC, 1 element'),
-    ('68 00 00 01 00 07 00 01 0A 01 00', 'typed read I:012, 1 element'),
+    ('68 00 00 01 00 07 00 00 0A 01 00', 'typed read O:012, 1 element'),
     ('68 00 00 01 00 07 00 0A 05 01 00', 'typed read file 10:5, 1 element'),
     ('68 00 00 01 00 0F 00 0C 0A 00 01 00', 'typed read file 12:10.0, 1 element'),
     ('68 0A 00 1E 00 07 00 07 00 0A 00', 'typed read N7:0, 10 elements (from 10 of 30)'),
