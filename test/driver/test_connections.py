@@ -191,7 +191,8 @@ def test_line_that_only_broadcasts_is_spared(share: str) -> None:
 
 @pytest.mark.parametrize('mode', ['Master', 'Peer'])
 def test_read_of_a_guest_is_the_question_where_there_are_no_rows_no_write(mode: str) -> None:
-    bench = Queue(mode, [], share='tcp:6000', is_open=True)
+    every = make_mapping('N7:0', 'Write', station=255, plc='SLC')
+    bench = Queue(mode, [every], share='tcp:6000', is_open=True)
     guest, answers = Guest('tcp:6000', ShareAccess.ALL), list[Packet]()
 
     def ask(*commands: bytes) -> None:
@@ -205,10 +206,13 @@ def test_read_of_a_guest_is_the_question_where_there_are_no_rows_no_write(mode: 
     ask(write, write, read)
     ask(write)
     bench.device.hear = bench.keep
+    bench.at(bench.clock() + 0.1, lambda: bench.write(every, [9]))
     for _ in range(4):
         ask(write)
     bench.let_through()
     ask(write, write, read)
     ask(write)
     assert [reply.sts for reply in answers] == [7, 7, 0, 0, 2, 7, 7, 7, 7, 7, 0, 0]
-    assert bench.values_written() == [5, 5, 5]  # one was kept
+    assert bench.values_written() == [5, 5, *[9] * (mode == 'Peer'), 5]  # what was kept
+    assert bench.listener.outcomes() == [
+        Outcome.UNKNOWN if mode == 'Peer' else Outcome.BROADCAST]

@@ -128,7 +128,7 @@ def test_reads_and_writes_go_by_way_of_the_master() -> None:
 
 def test_write_that_is_never_polled_for_expires() -> None:
     write = make_mapping('N7:10', 'Write', station=PLC, plc='SLC')
-    bench = Bench([write], DriverSettings(write_timeout=1.0), polled=(PLC,))
+    bench = Bench([write], DriverSettings(write_timeout=1.0, may_store=True), polled=(PLC,))
     bench.write(write, [7], run=0.9)
     assert bench.listener.outcomes() == []
     bench.run(0.5)

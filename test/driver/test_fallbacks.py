@@ -22,7 +22,7 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave
 from abdf1_ros.df1.stations import ActiveStationList
-from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackRow
+from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackRow, FallbackState
 from abdf1_ros.driver.interlocks.heartbeat import HeartbeatRow
 from abdf1_ros.driver.interlocks.plc import Conditions, Plc
 from abdf1_ros.driver.record import Claim, WriteRecord
@@ -76,8 +76,9 @@ class OneRow(StillClock):
         return self.row.ended(outcome, done)
 
     def guest(self, now: float) -> None:
-        claim = Claim(1, [self.mapping.extent])
-        claim.done = claim.lands_until = now
+        self.now = now
+        claim = self.record.begin(1, [self.mapping.extent])
+        self.record.ended(claim, Outcome.WRITTEN)
         self.row.write_ended(claim, now)
 
     def _write(self, write: Write, done: float, outcome: Outcome) -> Claim:
@@ -312,6 +313,13 @@ def test_rule_8_change_to_run_while_a_fallback_is_under_way_has_it_written_again
     row.make_due(FallbackCause.RUN, 2.0)  # between two packets
     one.fallback(write, 3.0)
     assert row.cause is FallbackCause.START and row.judge(3.0, -math.inf)
+    row.make_due(FallbackCause.RUN, 3.1)  # none is under way: it is due since 2.0 all the same
+    write = row.take(3.2)
+    one.guest(3.5)
+    assert one.fallback(write, 4.0) == 2.0
+    assert row.state is FallbackState.OVERWRITTEN
+    one.fallback(row.refresh(4.0), 4.1, Outcome.FAILED)
+    assert [row.judge(now, -math.inf) for now in (5.0, 5.1)] == [False, True]
 
 
 def test_rule_2_message_before_the_last_fallback_makes_no_row_fresh() -> None:

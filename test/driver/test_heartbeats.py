@@ -371,11 +371,15 @@ def test_rule_19_second_foreign_value_stays_until_a_new_start(event: str) -> Non
     cell.run(3.0)
     for value in (888, 889):
         cell.store(value)
+        bench.run_until(lambda value=value: len(cell.told()) == value - 887)
+        bench.run(0.1)
+        told = bench.driver.checks.known(1).told
+        assert told is not None and told > bench.listener.foreign[-1][0]  # its mode, at once
         cell.run(5.0)
     assert (cell.told(), cell.value, cell.states()) == ([False, True], 0, [BeatState.CONFLICT])
     text = bench.listener.foreign[-1][1]
     assert text == (
-        'another program writes this word: 889 was read where 2 was written; the '
+        'another program writes this word: 889 was read where 3 was written; the '
         'bridge writes 0 until the PLC goes from PROGRAM to RUN, you call ~/reload, or the port '
         'is opened again')
     cell.run(100.0)

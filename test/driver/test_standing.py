@@ -228,7 +228,8 @@ def test_unconfirmed_write_may_land_over_the_confirmed_one_that_follows() -> Non
     end(8, 3.0, Outcome.UNKNOWN, 5.0)
     end(7, 3.2, Outcome.UNKNOWN, 0.5)  # the write before it may land after it
     assert not standing.proof(end(9, 4.0, WRITTEN, 0.0), 4.2)
-    last = end(9, 8.2, WRITTEN, 0.0)
+    end(8, 8.15, WRITTEN, 0.0)
+    last = end(9, 8.3, WRITTEN, 0.0)
     for station, is_kept in ((2, True), (1, False)):
         standing.forget(station)
         assert bool(standing.proof(last, 8.4)) is is_kept
@@ -302,7 +303,13 @@ def test_message_that_stands_feeds_its_fallback_from_when_it_was_published() -> 
     bench.write(row, [7], run=0.5)
     bench.write(row, [7], run=0.5, age=0.4)
     assert bench.listener.outcomes()[-1] is STANDS
-    cell.run(0.2)
+    cell.refused, cell.spared = {'N7:0'}, 7
+    cell.run(0.2)  # the fallback is due, and tried once a second
+    for _ in range(2):
+        bench.write(row, [7], run=0.3)
+    assert bench.listener.outcomes()[-2:] == [WRITTEN, WRITTEN]
+    cell.refused.clear()
+    cell.run(1.0)
     assert bench.listener.outcomes()[-1] is Outcome.FALLBACK
 
 
