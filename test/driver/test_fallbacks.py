@@ -137,7 +137,7 @@ def test_rule_11_answered_write_of_a_guest_ends_the_pause() -> None:
     plc = Plc(1, [one.row], ActiveStationList([1], probe_time=1.0), one.record, Conditions())
 
     def ended(now: float, outcome: Outcome, write: Write | None = None) -> None:
-        claim = Claim(1, [one.mapping.extent], write, now)
+        claim = Claim(1, [one.mapping.extent], write, now - 0.5)
         claim.end(outcome, now, 0.0)
         plc.write_ended(claim, now)
 
@@ -152,7 +152,8 @@ def test_rule_11_answered_write_of_a_guest_ends_the_pause() -> None:
     ended(0.2, Outcome.WRITTEN)
     assert plc.next_due(math.inf) < 0.2
     ended(0.3, Outcome.UNKNOWN, own)  # one failure is no reason for a pause
-    ended(0.3, Outcome.UNKNOWN)  # nor is one of a guest
+    for write in None, Write(one.mapping, [3], 0.3):
+        ended(0.3, Outcome.UNKNOWN, write)  # nor is one of a guest or a message
     assert plc.rank(one.row, 0.3) is not None
     one.fallback(one.row.take(0.4), 0.5)
     plc.plan()
@@ -491,6 +492,19 @@ def test_rule_9_write_of_another_row_to_the_same_words_holds_up_for_its_own_time
     cell.run(0.5)
     assert cell.results()[-1] == TIMEOUT
     assert cell.word('N7:0') == 7
+
+
+def test_rule_9_fallbacks_that_became_due_during_a_write_follow_it_together() -> None:
+    record = (one := OneRow()).record
+    rows = [one.row, FallbackRow(record.words_of(speed_row(address='N7:1')))]
+    plc = Plc(1, rows, ActiveStationList([1], probe_time=1.0), record, Conditions())
+    claim = record.begin(1, [make_mapping('N7:0', length=2).extent])
+    for now, row in enumerate(rows):
+        row.make_due(FallbackCause.TIMEOUT, now)
+        assert plc.ready({}, now) == []
+    record.ended(claim, Outcome.WRITTEN)
+    plc.release()
+    assert plc.ready({}, 2.0) == rows
 
 
 @pytest.mark.parametrize('polling', ['Message', 'Standard'])  # here a station is often busy

@@ -102,7 +102,7 @@ def test_rule_3a_value_that_is_not_confirmed_is_repeated() -> None:
 def test_rule_3b_no_beat_while_a_fallback_is_not_confirmed() -> None:
     speed = speed_row()
     elsewhere = make_mapping('N7:0', 'Write', station=2, fallback=FALLBACK)  # it never answers
-    cell = Cell(beat_row(), speed, elsewhere, run=1.0)
+    cell = Cell(beat_row(), speed_row(address='N11:0', tag='first'), speed, elsewhere, run=1.0)
     cell.publish(speed, 3, run=0.2)
     cell.refused = {'N7:0'}
     cell.run(AFTER)
