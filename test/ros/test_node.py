@@ -548,9 +548,11 @@ def test_each_faulty_parameter_is_told_in_one_line(refusal: Callable[..., list[s
     (['--ros-args', '__ns:=/cell'], "-r is missing before ['__ns:=/cell']"),
     (['--ros-args', '-p'], "Couldn't parse trailing -p flag."),
     (['--ros-args', '--bogus'], '--bogus'),
-    (['--ros-args', '-r', f'__ns:=/{240 * "n"}'], "length should not exceed '255U - 8U'")],
+    (['--ros-args', '-r', f'__ns:=/{240 * "n"}'], "length should not exceed '255U - 8U'"),
+    (['--ros-args', '-r', f'__ns:=/{300 * "n"}'], 'invalid node namespace: unknown result code'),
+    (['--ros-args', '-r', f'__node:={256 * "n"}'], "node name length should not exceed '255'")],
     ids=['remap', 'colon', 'bare', 'list', 'help', 'namespace', 'slashes', 'bare_name',
-         'parameter', 'unknown', 'long'])
+         'parameter', 'unknown', 'topic', 'long', 'name'])
 def test_unusable_arguments_are_told_in_one_line(
         refusal: Callable[..., list[str]], arguments: list[str], expected: str) -> None:
     lines = refusal(*arguments)

@@ -69,7 +69,7 @@ _LOG_FAILURES = re.compile('.*Failed to create log directory|Failed opening file
 _NO_LOG_FILE, _LOG_FILE_NAME = '--disable-external-lib-logs', '--log-file-name'
 
 # Words in rclpy's errors about bad arguments.
-_BAD_ARGUMENTS = re.compile("Couldn't parse|should not exceed")
+_BAD_ARGUMENTS = re.compile("Couldn't parse|should not exceed|invalid node namespace")
 
 # Hints to put before an error: a pattern of the error, and the hint.
 _ADVICE = (
