@@ -253,7 +253,7 @@ def test_end_waits_until_results_and_diagnostics_have_arrived(
     end_together([bench.node], 5.0)
     (first, patience), (second, rest) = waits
     assert (first, second) == ('/abdf1/write_results', '/diagnostics')
-    assert patience <= 5.0 and 0.0 < rest <= 4.9  # of a subscriber that is stuck, for both
+    assert 0.0 < rest <= patience - 0.1 <= 4.9  # of a subscriber that is stuck, for both
     assert 'trace' not in {thread.name for thread in threading.enumerate()}
 
 
@@ -510,11 +510,11 @@ def test_odd_settings_are_told_in_the_log_but_not_without_end(
 
 def test_load_that_the_line_cannot_carry_is_told_before_other_remarks(
         make_bench: Benches, capfd: Output) -> None:
-    rows = [f'N{number}:7,Read,N{number}:0,1,PLC5,1,' for number in range(10, 40)]
+    rows = [f'N{number}:7,Read,N{number}:0,1,PLC5,1,' for number in range(10, 29)]
     make_bench(*rows, parameters=('default_period:=50',))
     warnings = [line for line in ''.join(capfd.readouterr()).splitlines() if 'WARN' in line]
     assert re.search(r'the periods need \d+% of the time of the line at \d+ baud', warnings[0])
-    assert '; or Period ' in warnings[0]
+    assert '; or Period ' in warnings[0] and len(warnings) == 20
 
 
 def test_map_without_a_row_is_told(make_bench: Benches, capfd: Output) -> None:

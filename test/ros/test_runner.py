@@ -388,6 +388,8 @@ def test_a_sign_comes_once_in_the_period_of_the_watchdog_if_there_is_one(
     systemd.setblocking(False)
     with pytest.raises(BlockingIOError):
         systemd.recv(99)
+    for _ in range(1000):
+        supervisor.say('READY=1')  # a systemd that hangs holds up nobody
 
 
 @pytest.mark.parametrize('address', ['', '/nowhere/notify', '@abdf1_nobody'])

@@ -221,9 +221,14 @@ def test_line_of_a_device_server_is_ours_when_any_station_has_answered_since_it_
         for level, is_open in (
             ('info', True), ('error', False), ('info', True), ('info', False))]
     session.begin_end()
-    assert around.link.wake.called  # the last commands do not wait for the next poll
+    session.go_on()
+    for opened in around.services.open, around.writes.open:
+        opened.call_args.args[3]()
+    assert around.link.wake.call_count == 3  # the last commands do not wait for the next poll
     around.is_offered, around.results.waiting = False, ['fallback']
     session.port_changed(PortState(False, 'lost while it waits'))
+    session.go_on()
+    around.services.open.assert_called_once()
     assert not session.reads.latest and not around.results.waiting
     assert session.driver.interlocks.forget_served.called is has_line
 
