@@ -16,7 +16,7 @@
 
 from collections.abc import Collection
 from dataclasses import replace
-from itertools import pairwise
+from itertools import cycle, pairwise
 from random import Random
 import struct
 from typing import Any
@@ -92,6 +92,11 @@ def test_station_that_answers_polls_and_takes_no_command_gets_an_eighth_at_most(
     while rig.clock() < 8.0:
         rig.ask(1, run=0.05)
     assert share_of(rig, ['C1'], 3 * (SETTINGS.nak_retries + 1)) <= 1 / 8
+    rig, answers = bench(PollingSettings((1, 2))), cycle((EOT, b'', b'', b''))
+    setattr(rig[1], 'handle', lambda symbol: (
+        next(answers) if getattr(symbol, 'station', None) == 1 else b''))
+    rig.start(1)
+    assert share_of(rig, ['P1'], 12) <= 1 / 8
 
 
 def test_dead_priority_station_does_not_keep_normal_ones_from_coming_back() -> None:
@@ -245,17 +250,31 @@ def test_command_that_was_late_for_its_poll_is_executed_when_it_comes_again() ->
 
 def test_reply_to_a_guest_that_cannot_be_fetched_does_not_make_its_station_inactive() -> None:
     rig = bench(PollingSettings((1, 2)))
+    rig.master.stations.routes[3] = 1
     rig[1].delay = 0.1
-    task = rig.ask(1)
-    task.blames = False
+    tasks = [rig.ask(number) for number in (1, 3)]
+    tasks[0].blames = tasks[1].blames = False
     rig.start()
-    rig.line.run(lambda: bool(rig[1].served), 1.0)
+    rig.line.run(lambda: len(rig[1].served) == 2, 1.0)
     rig[1].silent = True
-    rig.line.run(lambda: ended(task), 1.0)
+    rig.line.run(lambda: any(map(ended, tasks)), 1.0)
     rig[1].silent = False
+    assert [type(task.result) for task in tasks] == 2 * [StationInactive]
     rig.run(1.0)
-    assert isinstance(task.result, StationInactive)
     assert rig.master.changes == []
+
+
+def test_nodes_behind_a_gateway_get_one_message_at_a_time() -> None:
+    rig = bench(PollingSettings((7, 9)))
+    rig.master.stations.routes.update({1: 7, 2: 7})
+    rig[7].delay = 0.2
+    first, second, other = (rig.message(9, dst) for dst in (1, 1, 2))
+    rig.start(run=0.1)
+    assert rig[7].served == [first, other]
+    rig.run(0.3)  # its reply has come
+    assert rig[7].served == [first, other, second]
+    rig.run(0.3)
+    assert rig[9].heard == [packet.reply() for packet in (first, other, second)]
 
 
 def test_reply_that_was_taken_late_is_acknowledged_when_it_comes_again() -> None:

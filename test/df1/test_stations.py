@@ -206,8 +206,9 @@ def test_station_that_replies_too_late_is_silent_and_one_that_is_polled_is_not_a
     for lost, polled in ((4, [2]), (2, [2, 4])):  # who answers for 4 shows that it is back
         stations.lost(lost, 20.0)
         assert [number for number in (1, 2, 3, 4) if stations.is_polled(number)] == polled
-    assert stations.claim_message(1, 20.0) and not stations.claim_message(2, 20.0)
-    for asker, free in ((Asker.IN_TURN, 15.5), (Asker.OWN, 23.5)):
+        assert [stations.claim_message(number, now) for now in (15.0, 20.0)
+                for number in (1, 2, 4)] == [False, lost == 4, False, True, lost == 4, lost == 4]
+    for asker, free in ((Asker.IN_TURN, 19.0), (Asker.OWN, 23.5)):  # kept for a message
         stations.tried(2, 19.0, 20.0, was_silent=True, asker=asker)
         assert stations.probes.next == free
 

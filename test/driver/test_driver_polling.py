@@ -14,6 +14,8 @@
 
 """The driver as a master with standard polling, and broadcast rows with either polling."""
 
+from unittest.mock import Mock
+
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.polling import StandardPollingMaster
 from abdf1_ros.df1.settings import PollingSettings
@@ -113,13 +115,17 @@ def test_station_that_goes_and_comes_again_has_its_reads_released_at_once() -> N
 
 
 def test_mapped_station_that_is_in_no_list_is_polled_all_the_same() -> None:
-    read = make_mapping('N7:0', station=2, period=0)
-    settings = DriverSettings(polling=PollingSettings((1,), priority=(3,)))
-    bench = DriverBench([make_mapping(), read], network=STANDARD, settings=settings)
-    for station in (1, 2):
+    read = make_mapping('N7:0', station=6, period=0)
+    settings = DriverSettings(polling=PollingSettings((4, 1), priority=(3,)))
+    rows = [make_mapping(), read, make_mapping(station=3), make_mapping(station=2, via=15)]
+    bench = DriverBench(rows, network=STANDARD, settings=settings)
+    heard = bench.far.hear = Mock(side_effect=bytes)
+    for station in (1, 3, 4, 6, 15):
         bench.plc(station, 'PLC5', *FILES)
     bench.run(2.0)
     assert len(bench.listener.values(read)) > 20
+    polls = b''.join(data for (data,), _ in heard.call_args_list).split(b'\x10\x05')
+    assert [poll[0] for poll in polls[1:7]] == [3, 4, 1, 15, 6, 3]  # rows by number
 
 
 @BOTH

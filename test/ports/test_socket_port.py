@@ -143,14 +143,14 @@ def test_local_port_is_that_of_the_last_connection_unless_it_is_not_free_yet() -
 
 def test_client_that_is_thrown_out_again_and_again_is_told_of_the_other_one(
         monkeypatch: pytest.MonkeyPatch) -> None:
-    server = NewestClientServer()
+    server, other = NewestClientServer(), NewestClientServer()
     said = []
-    moments = Mock(side_effect=[0.0, 1.0, 2.0, 11.0, 13.0, 14.0, 15.0, 16.0])  # of all ends
+    moments = Mock(side_effect=[0.0, 0.5, 1.0, 2.0, 11.0, 13.0, 14.0, 15.0, 16.0])  # of all ends
     monkeypatch.setattr(socket_port, 'time', Mock(monotonic=moments))
-    for _ in range(5):
-        port = open_port(PortSettings(server.url))
+    for each in (server, other, *4 * [server]):
+        port = open_port(PortSettings(each.url))
         assert port.read(PATIENCE, port.fileno()) == b'!'  # type: ignore[attr-defined]
-        with socket.create_connection(server.address), pytest.raises(OSError) as caught:
+        with socket.create_connection(each.address), pytest.raises(OSError) as caught:
             port.read(PATIENCE, port.fileno())  # type: ignore[attr-defined]
         port.close()
         said.append(str(caught.value))
@@ -164,8 +164,9 @@ def test_client_that_is_thrown_out_again_and_again_is_told_of_the_other_one(
         port.read(PATIENCE, port.fileno())  # type: ignore[attr-defined]
     port.close()
     server.close()
-    assert [*said[:2], said[4]] == 3 * ['the other end has closed the connection']
-    assert said[2:4] == 2 * [
+    other.close()
+    assert [*said[:3], said[5]] == 4 * ['the other end has closed the connection']
+    assert said[3:5] == 2 * [
         'the other end has closed the connection, 3 times within 10 s: another client has this '
         'line, or takes it each time (then let the device server refuse a second client), or the '
         'inactivity time of the server is too short']
