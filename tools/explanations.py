@@ -16,7 +16,7 @@
 The cause and the cure of each numbered message and counter.
 
 The same for each outcome of a write. docs/reference/ is made from this;
-test/style/test_reference.py fails if an entry is missing.
+test/style/test_tables.py fails if an entry is missing.
 """
 
 from __future__ import annotations

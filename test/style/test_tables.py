@@ -12,18 +12,22 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Tables and rules of tools leave nothing out; the drawing shows the arrows of the code."""
+"""Generated tables, pages and rules of tools leave nothing out; the drawing shows the arrows."""
 
 from pathlib import Path
 import re
 
+from abdf1_ros.counters import numbered
+from abdf1_ros.driver.write import Outcome
+from abdf1_ros.messages import Message
 from abdf1_ros.pccc.families import FAMILIES, parse_address
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.values import types_of
 import pytest
 from support.cases import for_all
 
-from tools import drawing, tables
+from tools import drawing, reference, tables
+from tools.explanations import COUNTERS, MESSAGES, OUTCOMES
 from tools.rooms import Room, room_of, ROOMS
 
 
@@ -74,6 +78,48 @@ def test_numbers_of_messages_are_links() -> None:
     crc = next(row for row in rows(tables.counters()) if row[1] == 'CNT_CRC_ERRORS')
     assert crc == ['2547', 'CNT_CRC_ERRORS', 'frames received with a wrong CRC',
                    'See [2506](messages.md#2506).']
+
+
+def test_every_message_counter_and_outcome_is_explained() -> None:
+    assert (list(MESSAGES), list(COUNTERS), list(OUTCOMES)) == (
+        list(Message), [entry.name for entry in numbered()], list(Outcome))
+    assert all(COUNTERS.values()) and all(OUTCOMES.values())
+    assert [entry for entry in MESSAGES.values() if not entry.cause or not entry.cure] == []
+
+
+def test_numbers_2501_to_2561_are_all_documented() -> None:
+    folder = reference.ROOT / reference.REFERENCE
+    text = ''.join((folder / name).read_text(encoding='utf-8')
+                   for name in ('messages.md', 'counters.md'))
+    rows = [line for line in text.splitlines() if line.startswith('| ')]
+    for number in range(2501, 2562):
+        assert sum(row.startswith((f'| {number} ', f'| <a id="{number}"></a>{number} '))
+                   for row in rows) == 1, number
+
+
+def test_part_goes_between_its_markers() -> None:
+    text = 'a\n<!-- generated: x -->\nold\n<!-- end: x -->\nb\n'
+    assert reference.filled(text, 'x', 'new') == \
+        'a\n<!-- generated: x -->\n\nnew\n\n<!-- end: x -->\nb\n'
+    assert reference.filled(reference.filled(text, 'x', 'new'), 'x', 'old') == \
+        reference.filled(text, 'x', 'old')
+
+
+def test_missing_marker_is_named() -> None:
+    with pytest.raises(LookupError, match='no markers "generated: y"'):
+        reference.filled('text', 'y', 'new')
+
+
+def test_main_writes_what_has_changed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                                      capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / 'page.md'
+    file.write_text('<!-- generated: x -->\n<!-- end: x -->\n', encoding='utf-8')
+    monkeypatch.setattr(reference, 'ROOT', tmp_path)
+    monkeypatch.setattr(reference, 'PARTS', {('page.md', 'x'): lambda: 'new'})
+    assert reference.main() == 0
+    assert '\nnew\n' in file.read_text(encoding='utf-8')
+    assert reference.main() == 0
+    assert capsys.readouterr().out == 'page.md: x\n'
 
 
 A, B, C = Room(('a.py',), ''), Room(('b.py',), ''), Room(('c.py',), '')
