@@ -27,6 +27,7 @@ from unittest.mock import Mock
 from abdf1_ros.cli.conform import main
 from abdf1_ros.client import Client
 from abdf1_ros.conform.case import Case, CaseResult, Permission, Verdict
+from abdf1_ros.conform.ends import AskingEnd, Words
 from abdf1_ros.conform.wire import Wire
 from abdf1_ros.df1.frames import Damaged
 from abdf1_ros.errors import Abdf1Error
@@ -47,14 +48,6 @@ def port(tmp_path: Path) -> Iterator[str]:
     """Return a pseudo-terminal with a simulated SLC 1 at its other end."""
     with plc_line(tmp_path / 'plc', simulated_plc(1, 'SLC', time.monotonic, ('N7:0', 4))) as name:
         yield name
-
-
-def test_result_is_told_in_lines(port: str, capsys: Output) -> None:
-    assert main(['slave', '--port', port, *QUICK]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert [line.split()[:2] for line in lines if line[:4] in ('PASS', 'SKIP')] == [
-        ['PASS', 'poll-idle'], ['PASS', 'message-acknowledged'], ['SKIP', 'nak-resets']]
-    assert lines[-1] == '2 passed, 0 failed, 1 skipped'
 
 
 def test_run_in_which_nothing_was_tried_has_not_passed(port: str, capsys: Output) -> None:
@@ -95,9 +88,9 @@ def test_report_is_markdown(port: str, capsys: Output) -> None:
 
 def test_failures_skips_noise_and_early_enquiries_are_told(
         port: str, capsys: Output, monkeypatch: pytest.MonkeyPatch) -> None:
-    def results(cases: Sequence[Case], wire: Wire, end: object,
+    def results(cases: Sequence[Case], wire: Wire, end: AskingEnd,
                 allowed: frozenset[Permission]) -> Iterator[CaseResult]:
-        assert (allowed, wire.answer_time) == (permissions, 1.5)
+        assert (allowed, wire.answer_time, end.words) == (permissions, 1.5, words)
         wire.noise, wire.enquired_after, wire.has_heard = 3, 1.78, True
         yield CaseResult(cases[0], Verdict.FAIL, 0.1, 'ACK', 'NAK', ('we   10 05',))
         yield CaseResult(cases[0], Verdict.SKIP, got='needs a word')
@@ -105,9 +98,9 @@ def test_failures_skips_noise_and_early_enquiries_are_told(
     monkeypatch.setattr('abdf1_ros.cli.conform.run_cases', results)
     unknown = Mock(return_value=decode_identity(b'\xEE\x34'))
     monkeypatch.setattr('abdf1_ros.cli.conform.decode_identity', unknown)
-    permissions = {*Permission}
+    permissions, words = {*Permission}, Words(999, 9, 41)
     for options, missing, *told in (
-            (['--yes', '--words', 'N7:0'], set(), 'we   10 05\n', ' skipped: needs a word\n'),
+            (['--yes', '--words', 'n999:9', '--count', '41'], set(), 'we   10 05\n', ' skipped: needs a word\n'),
             (['--yes', '--report'], {Permission.WRITE}, ' | expected ACK, got NAK |'),
             (['--report'], {Permission.RESET}, ' | needs a word |', ': unknown processor\n')):
         permissions -= missing
@@ -116,17 +109,18 @@ def test_failures_skips_noise_and_early_enquiries_are_told(
         assert all(text in said.out for text in told)
         assert 'conform: 3 bytes outside of any symbol were' in said.err
         assert '--answer-time 1.5 that may look like a fault: try --answer-time 0.8\n' in said.err
+        words = Words(7, 0, 1)
 
 
 def test_damaged_character_is_not_an_answer(
         capsys: Output, monkeypatch: pytest.MonkeyPatch) -> None:
     said = cycle([b'\x10', Damaged(b'\x04')])
-    monkeypatch.setattr('abdf1_ros.cli.conform.open_port', lambda settings: Mock(
-        read=lambda *wait: next(said)))
+    port = Mock(read=lambda *wait: next(said))
+    monkeypatch.setattr('abdf1_ros.cli.conform.open_port', lambda settings: port)
     options = ['slave', '--port=socket://joe:4001', '--only=poll-idle', '--answer-time=0.01']
     assert main([*options, '--report']) == 1
     out = capsys.readouterr().out
-    assert '| FAIL | poll-idle |' in out and '- port: socket\n' in out
+    assert '| FAIL | poll-idle |' in out and '- port: socket\n' in out and port.close.called
 
 
 def test_echo_that_comes_byte_by_byte_is_not_an_answer(
@@ -149,7 +143,8 @@ def test_nobody_there_is_said(tmp_path: Path, capsys: Output) -> None:
     assert main(['slave', '--port', str(dead.name), '--answer-time', '0.05', '--only',
                  'poll-idle', '--report']) == 1
     said = capsys.readouterr()
-    assert 'no byte was received' in said.err and '\n- processor: not known\n' in said.out
+    assert said.err == 'conform: no byte was received: check cable, port, speed and power\n'
+    assert '\n- processor: not known\n' in said.out
     dead.close()
 
 
@@ -194,7 +189,9 @@ def test_simulator_is_a_node_of_a_radio_network_and_not_a_peer(
 @pytest.mark.parametrize(('target', 'duplex', 'case'), [
     ('master', 'half', 'poll-form'), ('client', 'full', 'reply-acknowledged')])
 def test_program_that_reads_is_answered_as_a_plc_answers(
-        tmp_path: Path, target: str, duplex: str, case: str, capsys: Output) -> None:
+        tmp_path: Path, target: str, duplex: str, case: str, capsys: Output,
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr('abdf1_ros.cli.conform.Wire', made := Mock(side_effect=Wire))
     link, over, read = str(tmp_path / 'line'), threading.Event(), list[object]()
 
     def ask() -> None:
@@ -207,12 +204,13 @@ def test_program_that_reads_is_answered_as_a_plc_answers(
     asking = threading.Thread(target=ask)
     asking.start()
     try:
-        assert main([target, '--pty', link, '--station', '2', '--only', case]) == 0
+        assert main([target, '--pty', link, '--station', '2', '--report', '--only', case]) == 0
     finally:
         over.set()
         asking.join()
     said = capsys.readouterr()
-    assert said.out.endswith('1 passed, 0 failed, 0 skipped\n') and link in said.err
+    assert '- result: 1 passed, 0 failed, 0 skipped\n' in said.out and link in said.err
+    assert '- port: pty\n' in said.out and made.call_args.kwargs['char_time'] == 0
     assert read and not Path(link).is_symlink()  # it would lead to another program's terminal
 
 

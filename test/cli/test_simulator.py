@@ -64,6 +64,7 @@ def data(tmp_path: Path) -> Path:
 
 Start = Callable[..., Process]
 
+LADDER_FILES = 'N10', 'N11', 'B12', 'T13'
 READY = 'simulator: stations 1 (PLC5), 2 (SLC) on '
 
 
@@ -135,10 +136,10 @@ def test_on_tcp_until_quit_one_client_after_the_other(start: Start, address: str
     assert simulator.result() == 0, simulator.text
 
 
-def test_end_after_seconds_with_its_input_closed(start: Start) -> None:
-    simulator = start('--seconds', '0.2')
+def test_end_by_the_clock_with_its_input_closed(start: Start) -> None:
+    simulator = start('--at', '0.3 quit', '--at', '0.2 silent 1')
     simulator.close_input()
-    _ended(simulator)
+    _ended(simulator, 'simulator: station 1: silent')
     assert simulator.lines[0].startswith(f'{READY}/dev/pts/')
 
 
@@ -180,7 +181,7 @@ def test_message_goes_out_though_nothing_comes_in(
 
 
 def test_commands_by_the_clock_keep_their_order(start: Start) -> None:
-    _ended(start('--at', '0.2 quit', '--at', '0.1 slow 1 2', '--at', '0 silent 2', '--at',
+    _ended(start('--at', '0.2  quit', '--at', '0.1 slow 1 2', '--at', '0 silent 2', '--at',
                  '0 delay 1 5'), *(f'simulator: station {text}' for text in (
                      '2: silent', '1: delay 5', '1: slow 2')))
 
@@ -355,12 +356,15 @@ def test_broadcast_by_radio_reaches_every_plc(
     links.return_value.exchange.assert_not_called()  # the modem has power
 
 
-def test_lamps_of_a_ladder_are_told_though_no_command_comes(
-        monkeypatch: pytest.MonkeyPatch) -> None:
+def test_lamps_of_ladders_are_told_though_no_command_comes(
+        monkeypatch: pytest.MonkeyPatch, data: Path) -> None:
+    data.write_text(DATA.partition('1,')[0] + ''.join(
+        f'{station},SLC,{name}:0,10,,,\n' for station in (3, 2) for name in LADDER_FILES), 'utf-8')
     now, said, lamps = [0.0], list[str](), list[tuple[str, Lamp, bool]]()
     monkeypatch.setattr('abdf1_ros.cli.simulator.LinkThread', links := Mock())
     monkeypatch.setattr('abdf1_ros.cli.simulator.time', Mock(monotonic=lambda: now[0]))
-    cast = Cast(parse_options(['--radio', '--ladder', '2']), lambda *lamp: lamps.append(lamp))
+    options = parse_options(['--radio', '--ladder=3', '--ladder=2', '--data', str(data)])
+    cast = Cast(options, lambda *lamp: lamps.append(lamp))
     cast.say = said.append
     cast.advance()
     now[0] = 1.0
@@ -371,10 +375,12 @@ def test_lamps_of_a_ladder_are_told_though_no_command_comes(
     cast.close()
     changes = [(Lamp.STOPPED, True), (Lamp.ALIVE, True), (Lamp.STOPPED, False),
                (Lamp.ALIVE, False), (Lamp.LOST, True)]
-    assert lamps == [('2', *change) for change in changes]
-    assert said == ['station 2: ROS stopped (heartbeat 0) on', 'station 2: ROS alive on',
-                    'station 2: ROS stopped (heartbeat 0) off', 'station 2: ROS alive off',
-                    'station 2: ROS lost (heartbeat stands still) on']
+    assert [lamp for lamp in lamps if lamp[0] == '2'] == [('2', *change) for change in changes]
+    assert [lamp for lamp in lamps if lamp[0] == '3'] == [('3', *changes[0]), ('3', *changes[-1])]
+    assert [text for text in said if text[8] == '2'] == [
+        'station 2: ROS stopped (heartbeat 0) on', 'station 2: ROS alive on',
+        'station 2: ROS stopped (heartbeat 0) off', 'station 2: ROS alive off',
+        'station 2: ROS lost (heartbeat stands still) on']
 
 
 def test_simulator_goes_on_when_nobody_reads_it_and_ends_when_told(data: Path) -> None:
@@ -407,7 +413,7 @@ def test_simulator_answers_and_ends_while_its_output_is_not_taken(
 
 
 def test_input_goes_on_when_a_job_comes_back_from_the_background(
-        data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        data: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
     """The first EIO was taken for the end of the input, so "fg" led to a deaf terminal."""
     texts: list[bytes | OSError] = [OSError(errno.EIO, 'Input/output error'), b'\xFF\nquit\n']
 
@@ -427,4 +433,4 @@ def test_input_goes_on_when_a_job_comes_back_from_the_background(
         assert main(['--data', str(data), '--pty', str(data.with_name('plc')), '--seconds', '5'
                      ]) == 0
     os.close(writer)
-    assert not texts
+    assert not texts and 'simulator: name a station (1, 2)\n' in capfd.readouterr().out

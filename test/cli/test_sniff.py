@@ -17,6 +17,7 @@
 from collections.abc import Iterator
 from contextlib import suppress
 from io import BytesIO
+from itertools import count
 import json
 import os
 from pathlib import Path
@@ -193,10 +194,13 @@ def test_file_without_bytes_is_told(
     assert captured.out.splitlines()[:5] == LINES
 
 
-def test_end_of_the_time_is_no_empty_file(capsys: Output, capture: str) -> None:
-    assert main(['--seconds', '1e-9', capture, capture]) == 0
-    captured = capsys.readouterr()
-    assert (captured.out.splitlines()[0], captured.err) == ('summary: 0 bytes', '')
+def test_end_of_the_time_is_no_empty_file(
+        capsys: Output, capture: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sniff, 'time', Mock(monotonic=count(5).__next__))
+    for seconds, size in (('1', '0 bytes'), ('7', '0.0 s, 66 bytes')):  # of both files
+        assert main(['--summary', '--seconds', seconds, capture, capture]) == 0
+        captured = capsys.readouterr()
+        assert captured.out.startswith(f'summary: {size}') and not captured.err
 
 
 def test_ctrl_c_shows_what_was_read_so_far(
@@ -319,16 +323,6 @@ def test_port_until_a_signal(tmp_path: Path) -> None:
     assert len(_told(sniff)) == 1
 
 
-def test_pipe_into_which_nobody_writes_until_a_signal(tmp_path: Path) -> None:
-    name = tmp_path / 'pipe'
-    os.mkfifo(name)
-    with Process('sniff', str(name)) as sniff:
-        writer = os.open(name, os.O_WRONLY)  # waits until it is opened there
-        sniff.end()
-        os.close(writer)
-    assert sniff.lines[0].startswith('summary: 0 bytes')
-
-
 @pytest.mark.parametrize(('way', 'number'), [
     ('file', signal.SIGTERM), ('--tap', signal.SIGINT),
     pytest.param('--port', signal.SIGINT, marks=pytest.mark.long)])
@@ -397,8 +391,10 @@ def test_what_a_slow_output_has_lost_is_told_and_saved(
     assert saved.read_text('ascii').splitlines()[2:6] == [
         '# ports: x pty', '# check: auto', '# duplex: auto', '# baud: 9600']
     tap.new_losses = Mock(return_value=0)
-    options = '--save', str(tmp_path / 'of_pty'), '--html', str(tmp_path / 'no' / 'page.html')
-    assert main(['--tap', 'pty', 'pty', *options]) == 2  # for the page; they have no speed
+    with monkeypatch.context() as full:
+        full.setattr(sys.stdout, 'flush', Mock(side_effect=[None, OSError, *5 * [None]]))
+        full.setattr(sniff, 'has_reader_left', lambda *_: False)
+        assert main(['--tap', 'pty', 'pty', '--save', str(tmp_path / 'of_pty')]) == 2  # no speed
     assert 'baud' not in (tmp_path / 'of_pty').read_text('ascii')
     monkeypatch.setattr('abdf1_ros.sniffer.capture.CaptureWriter.write', Mock(side_effect=OSError))
     assert main(['--port', 'x', '--baud', '19200', '--save', str(tmp_path / 'full')]) == 2

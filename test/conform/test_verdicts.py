@@ -68,7 +68,7 @@ FAULTS = [(target, habit, name) for targets, habit, name in [
     (ALL, Habit.LOST_AFTER_NOISE, 'noise-before-message'),
     (ALL, Habit.EXECUTES_BAD_CHECK, 'bad-check-not-executed'),
     (ALL, Habit.DOUBLES_CHECK, 'check-not-doubled'), (ALL, Habit.REPLY_WITHOUT_BIT, 'read-words'),
-    (ALL, Habit.KEEPS_ADDRESSES, 'read-words'), (ALL, Habit.ADDS_BYTE_TO_ECHO, 'echo-sizes'),
+    (ALL, Habit.KEEPS_ADDRESSES, 'largest-packet'), (ALL, Habit.ADDS_BYTE_TO_ECHO, 'echo-sizes'),
     (ALL, Habit.ALWAYS_STS, 'identity'), (ALL, Habit.ALWAYS_STS, 'element-too-high'),
     (ALL, Habit.ALWAYS_STS, 'unknown-command'), (ALL, Habit.ALWAYS_STS, 'unknown-function'),
     (ALL, Habit.WORDS_REVERSED, 'word-order'),
@@ -77,6 +77,7 @@ FAULTS = [(target, habit, name) for targets, habit, name in [
     (ALL, Habit.BIT_15_LOST, 'write-and-read'), (ALL, Habit.MASK_SETS_ONLY, 'masked-write'),
     (ALL, Habit.MASK_CHANGES_NEXT_WORD, 'masked-write'),
     (ALL, Habit.MASK_EXCHANGED, 'masked-write'), (BOTH, Habit.ACKS_TWICE, 'read-words'),
+    (ALL, Habit.REFUSES_MASK, 'masked-write'),
     (QUIET, Habit.CHECKS_FIRST_BYTE_ONLY, 'bad-check-ignored'),
     (QUIET, Habit.CHECKS_LAST_BYTE_ONLY, 'bad-check-ignored'),
     ((Target.PEER,), Habit.CHECKS_FIRST_BYTE_ONLY, 'bad-check-refused'),
@@ -449,11 +450,13 @@ def test_wait_for_a_symbol_ends_though_others_come_for_ever() -> None:
     with pytest.raises(Failed, match='nothing of the kind in 2 s'):
         wire.until(lambda symbol: False, 'a poll', 2.0)
     assert (line.now, line.sent) == (pytest.approx(2.0), b'')
-    line.data = b'\x55'
+    line.data = b'\x55' * 33_000
     with pytest.raises(Failed, match='got bytes outside of any'):
         wire.expect(SymbolKind.ACK)
-    assert wire.noise > 0
+    noise, line.data = wire.noise, b'\x55' * 33_000
+    wire.rest(0.6)
     line.data = b''
+    assert (wire.hear(), wire.noise - noise, noise % 33_000) == (None, 65536, 0)
     with pytest.raises(Failed, match='got silence'):
         wire.expect(SymbolKind.ACK)
     assert wire.has_heard
@@ -527,8 +530,13 @@ def test_reply_that_overtakes_its_ack_is_the_reply() -> None:
     assert end.collect() == reply
     assert line.sent == end.frame(command) + codec.ACK
     assert (end.owed, end.further(0.1)) == (set(), None)
-    line.data = codec.ACK
+    line.data, begun = codec.ACK, line.now
     assert end.offer(command) and end.owed == {command[4:6]}
+    line.data = b''
+    end.settle()  # it waits for the reply that is owed
+    assert line.now - begun > 5.0
+    line.data = end.frame(reply) + codec.NAK
+    assert (symbol := end.offer(command)) and (symbol.data, end.owed) == (reply, set())
 
 
 def test_enquiry_gets_the_last_response() -> None:
@@ -538,9 +546,11 @@ def test_enquiry_gets_the_last_response() -> None:
     for response in (codec.NAK, codec.ACK, codec.NAK, codec.ACK):
         wire.send(response)
         assert wire.hear(0.1) is None
-    line.data = codec.ACK.join(codec.divided(codec.message(bytes(6), BlockCheck.CRC)))
-    heard = [wire.hear(0.1) for _ in range(2)]  # the message has no response yet
-    assert [symbol.kind for symbol in heard if symbol] == [SymbolKind.ACK, SymbolKind.MESSAGE]
+    line.data = (codec.ACK + codec.NAK).join(
+        codec.divided(codec.message(bytes(6), BlockCheck.CRC)))
+    heard = [wire.hear(0.1) for _ in range(3)]  # the message has no response yet
+    assert [symbol.kind for symbol in heard if symbol] == [
+        SymbolKind.ACK, SymbolKind.NAK, SymbolKind.MESSAGE]
     line.data = codec.ENQ
     assert wire.hear(0.1) is None
     assert line.sent == codec.NAK + 2 * (2 * codec.NAK + 2 * codec.ACK) + codec.NAK
@@ -553,7 +563,7 @@ def test_silence_counts_from_the_last_byte_that_was_sent() -> None:
     wire = Wire(line, BlockCheck.CRC, line.clock, is_half_duplex=False, char_time=0.01)
     for size in (100, 50):
         wire.send(bytes(size))
-    assert wire.hear(0.5) is None
+    assert (wire.hear(0.5), wire.hear(0.0)) == (None, None)
     assert line.now == pytest.approx(2.0)
     line.data = codec.ACK
     wire.send(bytes(100))
@@ -578,6 +588,8 @@ LINK_DATA = bytes.fromhex('08 09 06 00 10 04 03')
     (codec.message(LINK_DATA, BlockCheck.BCC), '10 02 08 09 06 00 10 10 04 03 10 03 D2'),
     (codec.master_message(0x20, LINK_DATA, BlockCheck.BCC),
      '10 01 20 10 02 08 09 06 00 10 10 04 03 10 03 B2'),
+    (codec.master_message(0, LINK_DATA, BlockCheck.CRC),  # as of df1.frames
+     '10 01 00 10 02 08 09 06 00 10 10 04 03 10 03 84 50'),
     (codec.message(bytes.fromhex('07 11 41 00 53 B9' + '00' * 12), BlockCheck.CRC),  # M 5-7
      '10 02 07 11 41 00 53 B9' + '00' * 12 + '10 03 6B 4C'),
     # M 14-2
@@ -601,9 +613,11 @@ def test_frames_are_those_of_the_manual(frame: bytes, printed: str) -> None:
     ('55 00 10 06', True, Symbol(SymbolKind.NOISE, b'\x55\x00')),
     ('10 02 08 10 10 10 03 E8', True,
      Symbol(SymbolKind.MESSAGE, bytes.fromhex('1002081010 1003E8'), b'\x08\x10')),
-    ('10 02 08 10 06 09 10 03 EF', False,
-     Symbol(SymbolKind.MESSAGE, bytes.fromhex('10020810060910 03EF'), b'\x08\x09',
-            embedded=(SymbolKind.ACK,))),
+    ('10 02 08 10 06 10 15 09 10 03 EF', False,
+     Symbol(SymbolKind.MESSAGE, bytes.fromhex('1002081006101509 1003EF'), b'\x08\x09',
+            embedded=(SymbolKind.ACK, SymbolKind.NAK))),
+    ('10 01 11 10 03', False, Symbol(SymbolKind.NOISE, b'\x10\x01')),
+    ('10 01 11 10 03', True, Symbol(SymbolKind.NOISE, b'\x10\x01\x11')),
     ('10 02 08 10 03 F9', True,
      Symbol(SymbolKind.MESSAGE, bytes.fromhex('100208 1003F9'), b'\x08', is_good=False)),
     ('10 02 08 10 05', False, Symbol(SymbolKind.NOISE, b'\x10\x02\x08')),
@@ -633,13 +647,6 @@ def test_frame_is_divided_and_damaged_where_a_case_says() -> None:
         assert [[at - len(frame) for at, (byte, right) in enumerate(
             zip(other, frame, strict=True)) if byte != right]
             for other in codec.all_damaged(frame, BlockCheck.CRC)] == [[-2], [-1]]
-
-
-def test_symbol_is_shown_in_words() -> None:
-    symbols = [codec.next_symbol(codec.damaged(frame), BlockCheck.BCC, True) for frame in (
-        codec.message(LINK_DATA, BlockCheck.BCC), codec.poll(1))]
-    assert [*map(str, symbols)] == ['a message with a wrong check', 'a poll with a wrong check']
-    assert not any(codec.is_command(symbol) for symbol in symbols if symbol)
 
 
 @for_all('conversation', CONVERSATIONS)

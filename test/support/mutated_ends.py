@@ -59,7 +59,7 @@ Habit = Enum('Habit', [
     'REPLY_WITHOUT_BIT',  # 6 of CMD
     'KEEPS_ADDRESSES',  # of the command, in the reply
     'ADDS_BYTE_TO_ECHO', 'ACKS_TWICE',
-    'ALWAYS_STS',  # 50
+    'ALWAYS_STS', 'REFUSES_MASK',  # 50
     'WORDS_REVERSED', 'WRITES_FIRST_WORD_ONLY', 'READS_NEXT_WORD',
     'BYTES_EXCHANGED',  # of words that are written
     'REPEATS_CUT',  # a message without its last byte
@@ -105,7 +105,7 @@ Habit = Enum('Habit', [
     'ACKNOWLEDGES', 'ANSWERS_SYMBOLS', 'REPEATS_AFTER_NAK', 'REPLIES_FOR_OTHERS',
     'EXECUTES_FOR_OTHERS',  # in silence
     'REPEATS_REPLY', 'SENDS_ON', 'SENDS_ON_OWN',
-    'SENDS_ON_AGAIN',  # whenever it is heard
+    'SENDS_ON_AGAIN',  # whenever it is heard, two copies
     'TAKES_ANY_REPLY'])
 
 Symbol = tuple[object, ...]
@@ -350,7 +350,7 @@ class _Executor:
                 data[:6] + b'\xAA\x02' + data[8:10] + element + b'\0' + b'\x99\x99'))
         if fnc == b'\xA2' and has(Habit.WORDS_REVERSED):
             reply = reply[:6] + _reversed(reply[6:])
-        if has(Habit.ALWAYS_STS):
+        if has(Habit.ALWAYS_STS) or fnc == b'\xAB' and has(Habit.REFUSES_MASK):
             reply = self._done(data, sts=0x50)
         if has(Habit.REPLY_WITHOUT_BIT):
             reply = reply[:2] + bytes((cmd,)) + reply[3:]
@@ -692,13 +692,12 @@ class _Asker:
 
     def next_command(self) -> bytes:
         """Return the link data of the next command."""
-        if not self._wire.has(Habit.SAME_TNS):
-            self._tns += 1
+        self._tns = self._tns ^ 1 if self._wire.has(Habit.SAME_TNS) else self._tns + 1
         if self._wire.has(Habit.STOPS_AFTER_10) and self._tns > 0x123E:
             return b''
         sts = 2 if self._wire.has(Habit.STS_IN_COMMAND) else 0
         command = self.with_tns(bytes((1, 5, 0x0F, sts, 0, 0)) + _PLC5_READ)
-        return command[:2] if self._wire.has(Habit.TAKES_SHORT) else command
+        return command[:5] if self._wire.has(Habit.TAKES_SHORT) else command
 
     def with_tns(self, command: bytes) -> bytes:
         """Return a command with the newest TNS."""
@@ -800,7 +799,7 @@ class _Radio(Wire):
         if dst != self.own_number and is_new and self.habits & {
                 Habit.SENDS_ON, Habit.SENDS_ON_AGAIN}:
             self._sent_on.add(data)
-            self.say(self.frame(data), 0.1)
+            self.say(self.frame(data) * (1 + self.has(Habit.SENDS_ON_AGAIN)), 0.1)
         self.taken(data, dst == self.own_number)
 
 

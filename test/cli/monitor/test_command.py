@@ -350,8 +350,20 @@ def test_line_stays_marked_while_its_picture_is_shown(monkeypatch: pytest.Monkey
     for name in ('PlantWatch', 'NodeWatch', 'is_screen'):
         monkeypatch.setattr(f'abdf1_ros.cli.monitor.command.{name}', MagicMock())
     monkeypatch.setattr('curses.wrapper', drawn := Mock(side_effect=['/b', None, '']))
-    assert main(['--all']) == 0
+    monkeypatch.setattr('abdf1_ros.cli.monitor.command.time', clock := Mock())
+    clock.monotonic.side_effect = [5.0]  # --seconds count from the start
+    assert main(['--all', '--seconds', '9']) == 0
     assert [call.args[3:] for call in drawn.call_args_list] == [('',), (), ('/b',)]
+
+
+def test_signal_ends_each_wait_for_all_lines(monkeypatch: pytest.MonkeyPatch) -> None:
+    heard = list[bool]()
+    plant = MagicMock(lines=list, is_complete=False, wait=lambda has_ended, limit: heard.append(
+        signal.raise_signal(signal.SIGINT) or has_ended()))
+    watch = MagicMock(return_value=MagicMock(__enter__=lambda _: plant))
+    monkeypatch.setattr('abdf1_ros.cli.monitor.command.PlantWatch', watch)
+    monkeypatch.setattr('abdf1_ros.cli.monitor.command.limit_output', lambda: None)
+    assert (main(['--all', '--once']), heard) == (0, 3 * [True])
 
 
 def test_signal_gives_the_terminal_back(simulator: Process) -> None:
