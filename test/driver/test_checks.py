@@ -199,15 +199,15 @@ def test_refusal_or_reply_that_is_no_status_is_told_and_no_fault_of_the_station(
 
 
 def test_station_that_never_answers_this_is_asked_rarely() -> None:
-    bench, (plc,), (ears,) = make_bench(word(), network=Network(baud=115200, timeout=100,
-                                                                cmd_timeout=500), period=2.0)
+    bench, (plc,), (ears,) = make_bench(word(period=1000), period=2.0, network=Network(
+        baud=115200, timeout=100, cmd_timeout=500))
     ears.answer_diagnostics(lambda command: command._replace(tns=0).reply())
-    bench.run(50.0)
-    assert len(ears.times(STATUS)) == 1
-    assert bench.driver.checks.known(1).processor == \
+    bench.run(70.0)
+    first, second = ears.times(STATUS)
+    assert 60.0 < second - first < 63.0 and bench.driver.checks.known(1).processor == \
         'unknown (2508 ERR_COMMAND_TIMEOUT: Command Timed Out)'
     ears.answer_diagnostics(plc.serve)
-    bench.run(20.0)
+    bench.run(60.0)
     assert bench.driver.checks.known(1).identity is not None
 
 
@@ -238,7 +238,8 @@ def test_reads_that_are_due_wait_for_one_check_at_most(network: Network) -> None
         bench.run(2.5)
         waits.append(max(later - earlier for mapping in mappings
                          for earlier, later in pairwise(bench.listener.times(mapping))))
-        assert all(bool(heard.times(STATUS)) == bool(period) for heard in ears)
+        counts = [len(heard.times(STATUS)) for heard in ears]
+        assert bool(max(counts)) == bool(period) and max(counts) - min(counts) <= 1
     transaction = 0.012 if network.polling == 'Message' else 0.02
     assert waits[1] - waits[0] < transaction
     assert bench.driver.readings.reads.longest_poll_cycle == pytest.approx(waits[1], abs=1e-6)
@@ -381,15 +382,15 @@ def test_packets_are_those_of_the_processor_that_a_station_says_to_be(network: N
 
 @pytest.mark.parametrize('network', NETWORKS, ids=['message', 'standard'])
 def test_counters_are_read_once_for_each_request_and_never_else(network: Network) -> None:
-    bench, (plc,), (ears,) = make_bench(word(), network=network, run=2.0)
+    bench, (plc, _), (ears, other) = make_bench(word(), word(2), network=network, run=2.0)
     assert ears.times(COUNTERS) == []
-    for _ in range(2):
-        bench.driver.checks.request_counters(1)
-    assert bench.driver.checks.counters_wanted == {1}
+    for station in (1, 1, 2):
+        bench.driver.checks.request_counters(station)
+    assert bench.driver.checks.counters_wanted == {1, 2}
     before = plc.counters.messages_received
     bench.run(0.5)
     assert bench.driver.checks.counters_wanted == set()
-    assert len(ears.times(COUNTERS)) == 1
+    assert len(ears.times(COUNTERS)) == len(other.times(COUNTERS)) == 1
     counters = bench.driver.checks.known(1).counters
     assert before <= int(counters['messages received']) <= plc.counters.messages_received
     assert int(counters['polls received']) > 10
@@ -402,17 +403,17 @@ def test_counters_are_read_once_for_each_request_and_never_else(network: Network
 
 
 def test_counters_that_a_station_refuses_and_those_of_an_absent_station() -> None:
-    bench, (plc,), (ears,) = make_bench(word())
+    bench, (plc,), (ears,) = make_bench(word(), period=0.0)  # its type is not known
     for change, reason in (
             ({'sts': 0x10}, 'STS 10: illegal command, format or length, or the file does not '
-             'exist'), ({'tns': 0}, '2508 ERR_COMMAND_TIMEOUT: Command Timed Out')):
+             'exist'), ({}, ''), ({'tns': 0}, '2508 ERR_COMMAND_TIMEOUT: Command Timed Out')):
         ears.answer = lambda command, change=change: (  # type: ignore[misc]
-            command.reply()._replace(**change) if command.data[0] == COUNTERS
+            command.reply()._replace(**change) if change and command.data[0] == COUNTERS
             else plc.serve(command))
         bench.driver.checks.request_counters(1)
         bench.run(2.0)
         known = bench.driver.checks.known(1)
-        assert (known.counters, known.no_counters) == ({}, reason)
+        assert (bool(known.counters), known.no_counters) == (not change, reason)
         assert bench.driver.checks.counters_wanted == set()
     bench.driver.checks.request_counters(1)
     bench.run_until(lambda: bool(bench.driver.tasks.under_way) and math.inf in (
@@ -429,7 +430,7 @@ def test_counters_that_a_station_refuses_and_those_of_an_absent_station() -> Non
 
 @pytest.mark.parametrize('is_taken', [True, False])
 def test_lost_port_ends_a_request_that_waits_for_its_turn(is_taken: bool) -> None:
-    bench, _, (ears,) = make_bench(word(), run=1.0)
+    bench, _, (ears, _) = make_bench(word(), word(2), run=1.0)
     health = bench.driver.checks
     bench.driver.checks.request_counters(1)
     if is_taken:
@@ -442,7 +443,10 @@ def test_lost_port_ends_a_request_that_waits_for_its_turn(is_taken: bool) -> Non
     bench.open(run=2.0)
     assert ears.times(COUNTERS) == []  # nobody waits for them any more
     assert ears.times(STATUS)[-1] > begun
-    health.request_counters(1)
+    for station in (1, 2):
+        health.request_counters(station)
     assert health.find_due(bench.clock())
     bench.driver.stations.lost(1, bench.clock())
-    assert health.counters_wanted == set()
+    assert health.counters_wanted == {2}
+    bench.run(1.0)
+    assert health.known(2).counters and not health.counters_wanted
