@@ -176,7 +176,7 @@ def test_rule_5_waiting_row_of_a_silent_plc_hides_no_earlier_time() -> None:
 def test_rule_11_first_tries_go_first_then_plcs_that_answer() -> None:
     one = OneRow()
     stations = ActiveStationList([1], probe_time=1.0)
-    plc = Plc(1, [one.row], stations, one.record, Conditions())
+    plc = Plc(1, [one.row], stations, one.record, conditions := Conditions())
     one.row.make_due(FallbackCause.START, 0.0)
     stations.heard(1, 0.0)
     first = plc.rank(one.row, 0.0)
@@ -187,15 +187,25 @@ def test_rule_11_first_tries_go_first_then_plcs_that_answer() -> None:
     silent.end(Outcome.UNKNOWN, 2.1, 0.0)
     plc.write_ended(silent, 2.1)
     left_alone = plc.rank(one.row, 4.0)
-    assert first and answers and left_alone
-    assert first < answers < (2,) < (3,) < left_alone
+    assert (first, answers, left_alone) == (
+        (0, False, True), (1, 0, True, 0.0), (3, False, 1, 0.0))
     one.fallback(one.row.take(4.0), 4.1)
     one.row.make_due(FallbackCause.RUN, 5.0)
     one.fallback(one.row.take(5.0), 5.1, Outcome.UNKNOWN)
-    assert plc.rank(one.row, 8.0) == (*left_alone[:3], 5.0)  # its first try again
+    assert plc.rank(one.row, 8.0) == (3, False, 1, 5.0)  # its first try again
+    one.row.tries, plc.pause_end = 7, 99.0
+    for conditions.is_ending in (False, True):
+        assert bool(plc.rank(one.row, 8.0)) is conditions.is_ending
+    conditions.is_ending = False
     stations.lost(1, 8.0)  # probes have a pause of their own
-    plc.pause_end = 99.0
-    assert plc.rank(one.row, 90.0) is not None
+    assert plc.rank(one.row, 90.0) == (3, False, 3, 5.0)
+    stations.heard(1, 91.0)
+    plc.failures = 0
+    one.fallback(one.row.take(91.0), 91.1)
+    one.row.words.again_at = 92.0
+    for conditions.gave_way, conditions.is_beats_turn, least in (
+            (91.5, False, 92.0), (92.5, False, 92.5), (92.5, True, 93.0)):
+        assert plc.rank(one.row, 93.0) == (2, least, 91.0)
 
 
 def test_rule_7_message_refreshes_from_its_own_time_when_it_is_confirmed() -> None:
@@ -428,8 +438,8 @@ def test_rule_8_fallback_that_stands_is_put_off(event: str, waits: bool) -> None
         stations.lost(1, 2.0)
     stations[1].overdue = 2 * (event == 'late replies')
     youngest = {one.mapping: 5.0} if 'message' in event else {}
-    assert plc.to_refresh(youngest, 6.0) is (None if waits else row)
-    assert row.refresh_at == 6.0 + waits * row.after
+    assert plc.to_refresh(youngest, 6.25) is (None if waits else row)
+    assert row.refresh_at == (6.25 + row.after if waits else 6.0)
 
 
 def test_rule_8_message_that_is_lost_with_the_port_is_not_waited_for() -> None:

@@ -135,6 +135,8 @@ def test_rule_2_plc_behind_a_gateway_that_answers_at_all_is_a_first_contact(
     ours.end(Outcome.UNKNOWN, cell.now, 1.0)
     plc.write_ended(ours, cell.now)
     assert plc.pause_end == pytest.approx(cell.now + 7 * 0.5)
+    beat.ended(Outcome.UNKNOWN, cell.now)
+    assert plc.ready({}, cell.now + 0.3) == [beat]  # for its gateway answers
     claim = Claim(1, [beat.mapping.extent])
     claim.end(outcome, cell.now, -math.inf)
     plc.write_ended(claim, cell.now)
