@@ -201,9 +201,10 @@ def test_messages_that_dds_drops_are_counted(
 # Writes that do not go well
 
 def test_results_of_all_writes_that_wait_fit_into_their_queue(make_bench: Benches) -> None:
-    depths = {publisher.topic_name: publisher.qos_profile.depth
-              for publisher in make_bench(PULSES).node.publishers}
-    assert depths['/abdf1/write_results'] == queue.MAX_WAITING_WRITES
+    node = make_bench(PULSES).node
+    depths = {each.topic_name: each.qos_profile.depth for each in node.publishers}
+    assert depths['/abdf1/write_results'] == node.surroundings.results.waiting.maxlen == \
+        queue.MAX_WAITING_WRITES
 
 
 def test_station_with_another_error_code_is_told_once(make_bench: Benches, capfd: Output) -> None:
@@ -225,18 +226,20 @@ def test_level_that_changes_is_published_at_once(
         make_bench: Benches, monkeypatch: pytest.MonkeyPatch) -> None:
     bench = make_bench(PULSES, parameters=('snapshot_period:=0.0',))
     bench.node.link.stop()
-    session, published, looks = bench.node.session, [], []
+    session, published, looks, checks = bench.node.session, [], [], []
     session.publish_diagnostics(7.0)
     following = session.next_diagnostics
     session.publish_diagnostics(following + 0.3)
     assert 7.0 < following <= 8.0 and session.next_diagnostics == pytest.approx(following + 1.0)
     monkeypatch.setattr(session, 'publish_diagnostics', published.append)
+    monkeypatch.setattr(session.link_counters, 'check', checks.append)
     monkeypatch.setattr(bench.node.writes.host_clock, 'look', lambda *now: looks.append(now))
     monkeypatch.setattr(bench.node.surroundings.snapshot, 'has_subscribers', pytest.fail)
     session.levels, session.next_diagnostics = [], math.inf
     for _ in range(2):
         session.check()
-    assert (len(published), len(looks)) == (1, 2)
+    assert (len(published), len(checks), [now < wall for now, wall in looks]) == (
+        1, 2, [True, True])
 
 
 def test_end_waits_until_results_and_diagnostics_have_arrived(
@@ -518,9 +521,9 @@ def test_load_that_the_line_cannot_carry_is_told_before_other_remarks(
 
 
 def test_map_without_a_row_is_told(make_bench: Benches, capfd: Output) -> None:
-    make_bench(parameters=('map.gate.max:=7',))
+    make_bench(parameters=('map.gate.max:=7', 'read_only:=true'))
     told = ''.join(capfd.readouterr())
-    assert 'the map has no usable row' in told
+    assert 'the map has no usable row' in told and 'read_only: no heartbeat' not in told
     assert 'without effect, because only the map file counts: map.gate.max\n' in told
 
 

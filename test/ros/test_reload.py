@@ -21,12 +21,11 @@ import os
 from pathlib import Path
 import threading
 from typing import Any
-from unittest.mock import Mock
 
 from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.settings import PortSettings
-from abdf1_ros.problems import ConfigurationError, Problem
+from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.ros.bridge.guests import GuestPlaces
 from abdf1_ros.ros.bridge.reload import changes, refuse_harm
 from abdf1_ros.ros.bridge.session import BridgeSession
@@ -201,10 +200,10 @@ def test_place_that_is_no_longer_shared_is_free_for_another_line(
     bench.port_owners.hold('/other', places[0])
     with pytest.raises(ConfigurationError):
         bench.port_owners.hold('/other', places[1])
-    refusal = ConfigurationError([Problem('port', 'cannot be opened')])
-    monkeypatch.setattr('abdf1_ros.ros.bridge.node.refuse_harm', Mock(side_effect=refusal))
+    monkeypatch.setattr('abdf1_ros.ros.bridge.node.refuse_harm', lambda *files:
+                        bench.port_owners.hold('/other', places[1]))  # it still has both
     write_csv(bench.net, 'Baud,Timeout,Share', [f'115200,100,{places[0]}new'])
-    assert bench.reload() == (False, 'goes on as before: port: cannot be opened')
+    assert bench.reload()[1] == f'goes on as before: port: {places[1]} is the place of /abdf1'
     bench.port_owners.hold('/other', f'{places[0]}new')
 
 
@@ -214,6 +213,8 @@ def test_link_that_does_not_take_the_files_is_the_end(
     bench.write_map(SPEED, RECIPE, LEVEL)
     assert bench.reload() == (False, 'ends: the link does not accept the new files')
     assert bench.node.has_failed
+    monkeypatch.setattr(LinkThread, 'release', lambda link: False)
+    assert not bench.polling(False)[0]
     assert '[abdf1]: ends: the link does not accept the new files' in capfd.readouterr().err
 
 
@@ -316,9 +317,13 @@ def test_other_node_of_our_name_stays_known(bench: Bench) -> None:
 
 
 def test_parameters_tell_what_is_in_the_files_now(bench: Bench) -> None:
-    bench.write_net(250)
+    opener, capture = bench.node.surroundings.opener, Path(f'{bench.net}.cap')
+    opener.trace(str(capture), 1e6, {}, print)
+    write_csv(bench.net, 'Baud,Timeout,Error_Code', ['115200,250,BCC'])
     bench.write_map(LEVEL)
     assert bench.reload()[0]
+    opener.close()
+    assert 'BCC' in capture.read_text()
     assert bench.parameter('net.timeout') == 250
     assert bench.parameter('map.level.address') == 'F8:0'
     assert bench.parameter('map.speed.address') is None

@@ -90,7 +90,8 @@ class Bench(BridgeCell):
 
 @pytest.fixture
 def bench(tmp_path: Path) -> Iterator[Bench]:
-    with Bench(tmp_path, DATA, '\n'.join((HEADER, *ROWS)), 'Baud,Timeout\n115200,300') as bench:
+    with Bench(tmp_path, DATA, '\n'.join((HEADER, *ROWS)), 'Baud,Timeout\n115200,300',
+               'most_services:=6') as bench:
         yield bench
 
 
@@ -364,6 +365,7 @@ def test_services_of_rows_that_are_gone_close_once_when_no_call_waits() -> None:
         return end.value.value.success, end.value.value.message
 
     services.open(node, 100, 2.0, lambda: woken.append('link'))
+    begun = line_time()
     read = node.made['~/read_now/n0'](Trigger.Request(), Trigger.Response())
     puts = [node.made['~/set/lamp'](SetBool.Request(), SetBool.Response()) for _ in range(4)]
     for call, count in (read, 0), (puts[0], 0), (puts[1], 1), (puts[2], 2):
@@ -374,7 +376,8 @@ def test_services_of_rows_that_are_gone_close_once_when_no_call_waits() -> None:
     assert [*node.messages[1].values()] == [1, 2, None]
     assert ended(puts[2]) == (True, 'l0: stands in the PLC; l1: stands in the PLC')
     longest = 2.0 + Network().line_mode.longest_transaction(Network().line, 0.0)
-    services.look(line_time() + 2 * longest - 1.0)
+    services.look(begun + 2 * longest - 0.001)
+    assert len(woken) == 2
     services.look(line_time() + 2 * longest)
     assert ended(puts[0]) == (False, 'unknown whether written: no result has come')
     assert ended(puts[1]) == (False, 'l0: stands in the PLC')
@@ -384,9 +387,14 @@ def test_services_of_rows_that_are_gone_close_once_when_no_call_waits() -> None:
         call.send(None)
     assert ended(late) == (False, 'refused: 100 calls wait already')
     for take in node.takes[1:]:
-        take(ReadAnswer('Tank\x1b', line_time()))
-    assert {(is_read, text[:8]) for is_read, text in map(ended, crowd)} == {(True, r'Tank\x1b')}
+        take(ReadAnswer('Tank\x1b', line_time() - 3600.0))
+    assert {(is_read, text[:12], round((datetime.fromisoformat(
+        text[12:]).timestamp() - time.time()) / 3600)) for is_read, text in map(ended, crowd)} == {
+            (True, r'Tank\x1b at ', -1)}
     puts[3].send(None)
+    node.messages = None  # the write topic fails
+    with pytest.raises(TypeError):
+        node.made['~/set/lamp'](SetBool.Request(), SetBool.Response()).send(None)
     last = node.made['~/read_now/n1'](Trigger.Request(), Trigger.Response())
     last.send(None)
     reload(rows[1])
