@@ -197,6 +197,7 @@ def test_place_that_is_no_longer_shared_is_free_for_another_line(
         assert bench.reload()[0]
         bench.ros.until(Path(place.removeprefix('pty:')).is_symlink, 'the place')
     assert not (tmp_path / 'first').is_symlink()
+    assert [thread.name for thread in threading.enumerate()].count('df1 link') == 3
     bench.port_owners.hold('/other', places[0])
     with pytest.raises(ConfigurationError):
         bench.port_owners.hold('/other', places[1])
