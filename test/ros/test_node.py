@@ -26,7 +26,6 @@ import threading
 import time
 from typing import Any
 
-from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.writes import queue
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
@@ -235,7 +234,7 @@ def test_level_that_changes_is_published_at_once(
     monkeypatch.setattr(session.link_counters, 'check', checks.append)
     monkeypatch.setattr(bench.node.writes.host_clock, 'look', lambda *now: looks.append(now))
     monkeypatch.setattr(bench.node.surroundings.snapshot, 'has_subscribers', pytest.fail)
-    session.levels, session.next_diagnostics = [], math.inf
+    session.levels, session.next_diagnostics = session.diagnostics.levels(7.0)[::-1], math.inf
     for _ in range(2):
         session.check()
     assert (len(published), len(checks), [now < wall for now, wall in looks]) == (
@@ -405,19 +404,6 @@ def test_node_whose_name_cannot_be_read_keeps_no_message_back(
     bench.until_results(1)
     assert bench.words('N7:4', 2) == [5, 6]
     assert 'a periodic check has failed, all else goes on: UnicodeDe' in capfd.readouterr().err
-
-
-def test_third_internal_error_ends_the_node_with_status_1(
-        tmp_path: Path, refusal: Callable[..., list[str]],
-        monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail(driver: Driver, now: float) -> None:
-        raise KeyError('a bug')
-
-    monkeypatch.setattr(Driver, 'next_task', fail)
-    bench = Bench(tmp_path, (SPEED,))
-    with bench.ros, bench.plcs:
-        told = refusal(*ros_args(*bench.assignments), status=1)  # systemd starts it again
-    assert sum("internal error: KeyError('a bug'); please report it" in line for line in told) == 3
 
 
 def test_duplicate_name_is_told_and_forgotten(make_bench: Benches, capfd: Output) -> None:

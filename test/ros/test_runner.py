@@ -169,7 +169,7 @@ def test_plcs_of_all_lines_have_one_limit_and_a_dead_link_is_not_waited_for(
         monkeypatch: pytest.MonkeyPatch) -> None:
     clock = Mock(monotonic=Mock(side_effect=range(100, 200)))
     monkeypatch.setattr('abdf1_ros.ros.bridge.session.time', clock)
-    sessions: Any = [Mock(), Mock()]
+    sessions: Any = [Mock(**{'begin_end.side_effect': clock.monotonic}) for _ in range(2)]
     tell_plcs(sessions, 'ends', 6.0)
     assert [each.wait_for_plcs.call_args.args for each in sessions] == 2 * [(106.0, 'ends')]
     link = Mock(**{'is_alive.side_effect': [False, *4 * [True]]})
@@ -177,8 +177,10 @@ def test_plcs_of_all_lines_have_one_limit_and_a_dead_link_is_not_waited_for(
         'driver.interlocks.is_over': False})
     BridgeSession.wait_for_plcs(session, 199.0, 'ends')
     clock.sleep.assert_not_called()
-    BridgeSession.wait_for_plcs(session, 104.0, 'ends')
-    assert clock.sleep.call_count == 3  # after 101, 102 and 103
+    BridgeSession.wait_for_plcs(session, 106.0, 'ends')
+    link.state.is_open = False
+    BridgeSession.wait_for_plcs(session, 199.0, 'ends')
+    assert clock.sleep.call_count == 3  # after 103, 104 and 105
 
 
 def test_spare_does_not_look_for_the_line_while_it_ends() -> None:

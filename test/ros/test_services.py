@@ -262,27 +262,6 @@ def test_old_call_is_not_written_and_the_end_answers_who_waits(tmp_path: Path) -
         simulator.say('normal 2')
 
 
-def test_caller_of_a_killed_bridge_ends_by_its_own_limit(tmp_path: Path) -> None:
-    files = make_files(tmp_path)
-    answers: dict[str, Any] = {}
-    with Observer() as observer, files.start_simulator() as simulator, \
-            Process('node', *files.args()) as node:
-        calls = [(observer.node.create_client(kind, f'/abdf1/{name}'), name, kind)
-                 for kind, name in ((SetBool, 'set/lamp'), (Trigger, 'read_now/heartbeat'))]
-        observer.until(lambda: all(client.service_is_ready() for client, _, _ in calls), 'both')
-        observer.until(lambda: observer.call(*HEARTBEAT).success, 'the PLC')
-        simulator.say('delay 2 60000')
-        callers = [threading.Thread(target=lambda client, name, kind: answers.update(
-            {name: client.call(kind.Request(), 2.0)}), args=call) for call in calls]
-        for caller in callers:
-            caller.start()
-        observer.wait(lambda: False, 0.5)
-        node.send(signal.SIGKILL)
-        assert node.result() == -signal.SIGKILL
-        observer.until(lambda: not any(caller.is_alive() for caller in callers), 'their ends')
-        assert answers == {'set/lamp': None, 'read_now/heartbeat': None}
-
-
 def answer_of(observer: Observer, client: Any, request: Any) -> Any:
     """Call again until an answer comes: for 20 s DDS may send a call to a killed bridge alone."""
     def call() -> Any:

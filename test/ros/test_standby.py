@@ -190,21 +190,21 @@ def test_line_that_was_lost_for_a_moment_has_its_active_stations_again(
 
 
 @pytest.mark.parametrize(('port', 'heard', 'has_line'), [
-    ('/dev/ttyS0', [None], True), ('socket://a:1', [None, 7.0], True),
+    ('/dev/ttyS0', [None], True), ('socket://a:1', [None, 5.0], True),
     ('socket://a:1', [], True), ('socket://a:1', [None, 4.0], False)])
 def test_line_of_a_device_server_is_ours_when_any_station_has_answered_since_it_was_opened(
         port: str, heard: list[float | None], has_line: bool,
         monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr('abdf1_ros.ros.bridge.session.line_time', lambda: 5.0)
-    events, session = Mock(), object.__new__(BridgeSession)
+    events, session, latest = Mock(), object.__new__(BridgeSession), dict[str, list[int]]()
     around = Mock(active_words=None)
     stations = MagicMock(**{'words.return_value': [6], '__iter__.side_effect': lambda: iter(
         [SimpleNamespace(last_heard=when) for when in heard])})
     # a station comes while the first table is published, maybe after that of the other thread
     around.active_stations.publish.side_effect = lambda table: setattr(
         stations.words, 'return_value', [7])
-    vars(session).update(_surroundings=around, _port_text='', events=events, reads=Mock(latest={}),
-                         driver=Mock(stations=stations), configuration=Mock(
+    vars(session).update(_surroundings=around, _port_text='', events=events, driver=Mock(
+                         stations=stations), reads=Mock(latest=latest), configuration=Mock(
                              port=port, **{'parameters.standby': has_line}))
     for is_open, is_released in (True, False), (False, False), (True, False), (False, True):
         around.link.is_released = is_released
@@ -212,7 +212,7 @@ def test_line_of_a_device_server_is_ours_when_any_station_has_answered_since_it_
         for _ in range(2):
             session.port_changed(around.link.state)
         assert session.has_line is (is_open and has_line)
-        session.reads.latest['speed'] = [1]
+        latest['speed'] = [1]
     tables = around.active_stations.publish.call_args_list
     assert [call.args[0].data[0] for call in tables] == [6, 7, 0, 7, 0]  # none without a port
     assert events.port_changed.call_count == 4  # late replies are no errors
@@ -220,6 +220,7 @@ def test_line_of_a_device_server_is_ours_when_any_station_has_answered_since_it_
         f"call.{level}('the port', '{port}: {is_open}')"
         for level, is_open in (
             ('info', True), ('error', False), ('info', True), ('info', False))]
+    session.driver.interlocks.wind_down.side_effect = around.link.wake.reset_mock
     session.begin_end()
     session.go_on()
     for opened in around.services.open, around.writes.open:
@@ -229,7 +230,7 @@ def test_line_of_a_device_server_is_ours_when_any_station_has_answered_since_it_
     session.port_changed(PortState(False, 'lost while it waits'))
     session.go_on()
     around.services.open.assert_called_once()
-    assert not session.reads.latest and not around.results.waiting
+    assert not latest and not around.results.waiting
     assert session.driver.interlocks.forget_served.called is has_line
 
 
@@ -275,6 +276,7 @@ def test_spare_in_the_queue_of_a_device_server_waits_and_keeps_its_line_over_a_r
             ros.until(lambda: ros.node.count_publishers('/abdf1/read/speed') == 1, 'the line')
             assert ros.call(Trigger, '/abdf1/reload', Trigger.Request()).success
             assert spare.session.has_line  # its port is still open
+            assert ros.node.count_publishers('/abdf1/read/speed') == 1
         finally:
             ros.end(spare)
             server.close()
