@@ -74,6 +74,7 @@ def test_message_based_master_gives_up_a_slow_reply_in_silence() -> None:
     poll(rig, 7)  # the late reply comes now, and is passed on all the same
     assert rig[7].heard == [command.reply(), second.reply()]
     assert rig.master.stations[8].overdue == 0
+    assert rig.ask(BROADCAST, run=1.0).seconds == pytest.approx(0.058, abs=0.001)  # with its pause
 
 
 @BOTH
@@ -196,11 +197,14 @@ def test_message_that_a_gateway_does_not_take_says_nothing_about_the_gateway(
     rig.master.stations[8].replies = 1
     rig[7].deaf = True
     rig.message(9, 8)
+    rig.message(9, 7)
     rig.start()
-    poll(rig, 9, times=3)
-    assert [reply.sts for reply in rig[9].heard] == [2]
+    poll(rig, 9, times=6)
+    assert [(reply.src, reply.sts) for reply in rig[9].heard] == [(8, 2), (7, 2)]
+    assert {(event.message.number, event.station) for event in rig.master.events} == {
+        (2509, 8), (2515, 7), (2519, 7), (2521, 7), (2523, 9)}
     assert str(rig.ask(8, run=0.5).result) == str(StationInactive(8))
-    assert rig.master.said.split().count('C7') == 3  # twice, then once for the silent station
+    assert rig.master.said.split().count('C7') == 5  # twice each, then once for the silent station
     assert isinstance(rig.ask(7, run=0.5).result, CommandTimeout)
     rig[7].deaf = False
     assert isinstance(rig.ask(8, cmd=0x06, run=0.5).result, Packet)  # perhaps the gateway's own

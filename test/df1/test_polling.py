@@ -22,7 +22,7 @@ import struct
 from typing import Any
 
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import EOT, message_frame
+from abdf1_ros.df1.frames import ACK, EOT, message_frame
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.polling import COMMANDS_BETWEEN_POLLS
 from abdf1_ros.df1.settings import LinkSettings, PollingSettings
@@ -220,16 +220,18 @@ def test_message_that_is_late_for_its_poll_belongs_to_the_station_that_sends_it(
     task = rig.ask(1)
     rig.start()
     rig.line.run(lambda: 'P2' in rig.master.said, 1.0)
-    begun = rig.clock()
+    begun, deadline = rig.clock(), rig.master.machine.deadline
     late = task.command.reply() if is_waited_for else Packet(5, 1, 0x4F, 0, 0x77)
-    for packet in (late, late._replace(dst=9, tns=0x88)):  # the second is for another node
-        rig.master.machine.receive_data(message_frame(packet.encode(), Checksum.CRC), begun + 0.05)
+    for packet in (late, late, late._replace(dst=9, tns=0x88)):  # the last is for another node
+        heard = message_frame(packet.encode(), Checksum.CRC) + ACK
+        rig.master.machine.receive_data(heard, begun + 0.05)
     assert rig.master.stations[1].last_heard == begun + 0.05
+    assert rig.master.machine.deadline == deadline  # station 2 gets no longer time
     assert rig.master.stations[2].last_heard is None
     assert rig.master.machine.data_to_send() == b''  # its ACK would be taken for station 2's
     assert ended(task) is is_waited_for
     counts = rig.master.counts()
-    assert (counts['messages_received'], counts['replies_received']) == (2, 1)
+    assert (counts['messages_received'], counts['replies_received']) == (3, 1)
     assert counts.get('stale_messages', 0) == (not is_waited_for)
     assert 'invalid_messages' not in counts
     if not is_waited_for:
@@ -320,7 +322,8 @@ def test_fault_heard_while_probing_is_counted_and_told() -> None:
     rig = bench(PollingSettings((1, 2)), dead=(1,))
     rig.start(1, run=5.0)
     good = message_frame(Packet(5, 1, 0x4F, 0, 7).encode(), Checksum.CRC)
-    for heard in (good[:-1] + bytes((good[-1] ^ 1,)), good[:8] + EOT + good):
+    for heard in (b'\x10\x55\x33', good[:-4], good[:-1] + bytes((good[-1] ^ 1,)),
+                  good[:8] + EOT + good):
         assert not rig.master.stations[1].active
         polls = len(rig.master.times('P1'))
         while len(rig.master.times('P1')) == polls:
@@ -329,8 +332,9 @@ def test_fault_heard_while_probing_is_counted_and_told() -> None:
         rig.line.wake(rig.master.machine)
     counts = rig.master.counts()
     names = ('crc_errors', 'invalid_messages', 'stale_messages')
-    assert [counts[name] for name in names] == [1, 1, 1]
-    assert [number for number, *_ in rig.master.numbers()] == [2506, 2518, 2510]
+    assert [counts[name] for name in names] == [1, 2, 1]
+    assert rig.master.numbers() == [
+        (2514, 0x55), (2516, 0x55), (2518,), (2506, 222, 240, 223, 240), (2518,), (2510, 1, 5, 7)]
     assert rig.master.changes == [(1, True)]
 
 
