@@ -87,6 +87,8 @@ class ListeningMachine(Machine):
         self.counters.chars_received += len(data)
         if not self.may_be_old:
             self.listener.hear(data, now)
+        elif self.is_behind:  # the bytes that still wait are as old as these
+            self._old_until = now + OLD
 
     def handle_timeout(self, now: float) -> None:
         """Do what is due when the clock reads ``now``."""
