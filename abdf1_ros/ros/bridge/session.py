@@ -116,7 +116,8 @@ class BridgeSession:
         node, parameters = surroundings.node, configuration.parameters
         network, mappings = configuration.network, configuration.mappings
         self.reads = ReadTopics(
-            node, surroundings.published, (configuration.port, *network.ports[1:]))
+            node, surroundings.published,
+            (configuration.port, *network.ports[1:], f'as station {network.station}'))
         seen = Seen(lambda: surroundings.names.text, latest=self.reads.latest,
                     diagnostics_period=parameters.diagnostics_period)
         self.events = LineEvents(

@@ -75,15 +75,16 @@ class ReadTopics:
 
     At a reload, call ``open`` before the new driver runs, and ``take_over`` after the old driver
     has stopped. Publishers of the old map (``published``) are used again where they fit.
-    ``ports``: names of the ports of the line; other ports may lead to other PLCs.
+    ``line``: its ports, which may lead to other PLCs, and our own Station, on which it depends
+    what words a PLC-5 gives to PLC-2 commands.
     ``latest``: the last values of this connection, by topic.
     """
 
     def __init__(self, node: Node, published: dict[str, ReadTopic],
-                 ports: tuple[str, ...] = ()) -> None:
+                 line: tuple[str, ...] = ()) -> None:
         self._node = node
         self._published = published
-        self._ports = ports
+        self._line = line
         self._at_once = _VALUES_AT_ONCE
         self._later: deque[tuple[Publisher, RosMessage | bytes]] = deque()
         self.latest: dict[str, Values] = {}
@@ -144,7 +145,7 @@ class ReadTopics:
         self._published.update(self._topics)
 
     def _topic(self, mapping: Mapping, point: ReadPoint, old: ReadTopic | None) -> ReadTopic:
-        shape = *_SHAPE(mapping), self._ports
+        shape = *_SHAPE(mapping), self._line
         promise = mapping.promise(point.stale_time)
         if old is not None and old.is_fit_for(shape, promise):
             return old
