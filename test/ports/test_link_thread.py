@@ -412,7 +412,10 @@ def test_other_machine_on_a_port_that_is_opened_anew(pty: Pty, link: Link) -> No
     before, after = Script(Listen(None)), Script(Listen(None))
     thread = link.start(before.machine, pty.name)
     assert pty.read(5) == READY
-    assert thread.exchange(after.machine, lambda: None, reopen=True)
+    shown: list[PortState] = []
+    assert thread.exchange(after.machine, lambda: None, reopen=True,
+                           take_over=lambda: shown.append(thread.state))
+    assert shown == [PortState(False, 'the port is being opened')]
     assert before.end() == repr(PortLost('the files have been read again'))
     assert pty.read(5) == READY
     assert [link.state().is_open, link.state().is_open] == [True, True]
