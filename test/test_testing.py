@@ -15,6 +15,8 @@
 """The fixture for tests of cells: the whole example, and the test that its tutorial shows."""
 
 from collections.abc import Callable
+from functools import partial
+from itertools import count
 import os
 from pathlib import Path
 import re
@@ -31,6 +33,7 @@ from abdf1_ros.ros import observer
 from abdf1_ros.ros.topics.messages import latched_qos
 from abdf1_ros.testing import abdf1_cell, Bridge, Observer, PATIENCE, Plcs, SimulatedCell
 import pytest
+from rcl_interfaces.srv import GetParameters
 from rclpy.node import Node
 from std_msgs.msg import Int16MultiArray
 from support.forked import Forked
@@ -116,8 +119,8 @@ def test_domain_of_others_and_the_default_one_are_not_taken(
 def test_what_can_never_come_is_told_at_once(abdf1_cell: Cells) -> None:  # noqa: F811
     data = 'Station,PLC_Type,Address,Length,Values,Motion,Period\n1,SLC,N7:0,4,250,,\n'
     rows = 'Tag,Command,Address,Station,PLC_Type\npressure,Read,N7:{},1,SLC\n'
-    with pytest.raises(ConfigurationError, match='map.csv:2:3'):
-        abdf1_cell(data, rows.format('x'))
+    with pytest.raises(ConfigurationError, match='(?s)map.csv:2:3.*map.csv:3:1'):
+        abdf1_cell(data, rows.format('x') + ',Read,N7:0,1,SLC')
     with pytest.raises(ConfigurationError, match='net.csv: .* only Mode Master with Error'):
         abdf1_cell(data, rows.format(0), 'Mode\nPeer\n')
     with pytest.raises(LookupError, match='there is no station 3'):
@@ -128,6 +131,7 @@ def test_what_can_never_come_is_told_at_once(abdf1_cell: Cells) -> None:  # noqa
         cell.ros.listen(Int16MultiArray, '/abdf1/read/pressure').first()
     with pytest.raises(AssertionError, match='bridge has ended with 2'):
         cell.ros.until(lambda: False, 'a condition that is only false')
+    assert cell.ros.until(lambda: 7, 'what is there though the bridge has ended') == 7
     assert time.monotonic() - begun < PATIENCE - 5.0
 
 
@@ -162,21 +166,32 @@ def test_log_of_a_bridge_has_all_starts_and_its_end_is_shown(
         bridge.check()
 
 
-def test_program_of_a_ladder_runs_in_the_station_that_is_named(tmp_path: Path) -> None:
+def test_program_of_a_ladder_runs_in_the_station_that_is_named(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr('abdf1_ros.testing.time', clock := Mock(**{'monotonic.return_value': 9}))
     (tmp_path / 'data.csv').write_text(
-        'Station,PLC_Type,Address,Length\n1,SLC,N7:0,2\n2,SLC,N7:0,2\n3,SLC,N7:0,2\n', 'utf-8')
+        'Station,PLC_Type,Address,Length,Motion,Period\n1,SLC,N7:0,2,,\n2,SLC,N7:0,2,,\n'
+        '3,SLC,N7:0,3,Ramp,1000\n', 'utf-8')
     plcs = Plcs(tmp_path / 'data.csv', ladders=[2, 3])
     assert [plcs[number].ladder is None for number in (1, 2, 3)] == [True, False, False]
     plcs.set('N7:0', -0x8000, 0xFFFF)
+    clock.monotonic.return_value = 16
+    plcs.set('N7:1', 40, station=3)  # its program ran before
     assert [plcs.word('N7:0'), plcs.word('N7:1')] == [0x8000, 0xFFFF]
-    plcs.lose()
+    assert [plcs.word(f'N7:{number}', 3) for number in range(3)] == [7, 40, 7]
+    monkeypatch.undo()
+    with pytest.raises(AssertionError), plcs:  # the line ends all the same
+        plcs.faults.append(ValueError())
+    assert not plcs.link.is_alive() and not Path(plcs.port).is_symlink()
 
 
 def test_gateway_of_the_data_answers_for_its_plcs(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / 'data.csv').write_text('Station,PLC_Type,Address,Via\n1,SLC,N7:0,10\n', 'utf-8')
     monkeypatch.setattr('abdf1_ros.testing.LinkThread', links := Mock())
-    Plcs(tmp_path / 'data.csv').lose()
+    (plcs := Plcs(tmp_path / 'data.csv')).lose()
+    links.call_args.kwargs['on_fault'](bug := ValueError())
+    assert plcs.faults == [bug]
     line = ScriptedLine(links.call_args.args[0])
     for station, answer in ((1, b''), (10, frames.EOT)):
         line.write(frames.poll_frame(station))
@@ -208,6 +223,21 @@ def test_executor_ends_before_a_node_goes_and_the_context_last(
             record(owner, name)
     assert calls == ['shutdown', 'destroy_node', 'try_shutdown']
     assert observer.executor.get_nodes() == []
+
+
+def test_publisher_asks_its_node_until_one_of_the_questions_is_answered(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr('abdf1_ros.testing.time', Mock(monotonic=count(5).__next__))
+    never, late = Mock(done=lambda: False), Mock(done=Mock(side_effect=[False, False, True]))
+    observer = Mock(until=lambda condition, _: next(filter(None, (condition() for _ in '12345'))))
+    observer.meet = partial(Observer.meet, observer)
+    node = observer.node
+    client = node.create_client.return_value
+    client.call_async.side_effect = [never, late, never]
+    assert Observer.publisher(observer, Int16MultiArray, '/line/plc/write/a') \
+        is node.create_publisher.return_value
+    assert node.create_client.call_args[0] == (GetParameters, '/line/plc/get_parameters')
+    node.destroy_client.assert_called_once_with(client)
 
 
 def test_cell_that_cannot_be_made_leaves_no_thread(
