@@ -67,12 +67,6 @@ def test_names_of_the_package() -> None:
         abdf1_ros.Clients  # noqa: B018
 
 
-def test_abdf1_tells_its_version() -> None:
-    done = subprocess.run([sys.executable, '-m', 'abdf1_ros', '--version'], capture_output=True,
-                          text=True, check=True, timeout=60, cwd=PACKAGE.parent)
-    assert done.stdout == f'abdf1_ros {package_version()}\n'
-
-
 @for_all('folder', [
     'driver', 'driver/interlocks', 'driver/reads', 'driver/writes', 'plan', 'ports', 'settings'])
 def test_map_of_a_folder_names_what_is_there(folder: str) -> None:

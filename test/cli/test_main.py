@@ -31,6 +31,7 @@ from zipfile import ZipFile
 from abdf1_ros.cli import main as commands
 from abdf1_ros.cli import terminal
 from abdf1_ros.cli.main import COMMANDS
+from abdf1_ros.paths import package_version
 import pytest
 from support.cases import compare_stored, long_unless
 from support.commands import call, Output
@@ -209,7 +210,8 @@ def test_signal_where_nothing_is_under_way_ends_quietly(
 
 
 @pytest.mark.parametrize(('given', 'status', 'told'), [
-    (['plcc'], 2, '"plcc" is not a command; did you mean plc?'), (['--version'], 0, 'abdf1_ros '),
+    (['--version'], 0, f'abdf1_ros {package_version()}\n'),
+    (['plcc'], 2, '"plcc" is not a command; did you mean plc?'),
     (['plc\x1b'], 2, r'"plc\x1b" is not a command'),
     (['plc', '\x1b'], 2, r'"\x1b" is not a command'),
     (['help'], 0, 'plc        read, write'), ([], 2, 'plc        read, write')])

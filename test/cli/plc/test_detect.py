@@ -16,18 +16,16 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
-import os
 from pathlib import Path
-import re
-import select
-import threading
+from unittest.mock import MagicMock, Mock
 
 from abdf1_ros import settings
 from abdf1_ros.cli.plc import detect
 from abdf1_ros.cli.plc.command import main
 from abdf1_ros.cli.plc.detect import BAUD_RATES, LineSettings, Search
 from abdf1_ros.cli.plc.init import net_csv
+from abdf1_ros.cli.plc.line import network_of
+from abdf1_ros.cli.plc.parser import make_parser
 from abdf1_ros.cli.plc.presence import Presence, scan
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.checksum import Checksum
@@ -43,7 +41,7 @@ from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 import pytest
 from support.driver_bench import simulated_plc
 from support.odd_device import Answer, OddDevice, Wiring
-from support.plc_line import Leap, LosesPolls, LOSSY, machine_line, odd_line, plc_line
+from support.plc_line import machine_line, odd_line
 from support.ptys import Pty
 
 
@@ -87,12 +85,12 @@ def test_usual_baud_rates_come_first_and_none_is_left_out() -> None:
 def test_everything_is_tried_on_a_silent_line(tmp_path: Path) -> None:
     line = Pty(tmp_path / 'line')
     trying = Trying()
-    search = Search(Network(com_port=str(line.name), timeout=20), [3, 1, 4], trying)
+    search = Search(Network(com_port=str(line.name), timeout=20), [0, 3, 1], trying)
     assert search.run((19200, 9600)) is None
     line.close()
-    one_speed = ['full duplex, CRC, station 3', 'full duplex, CRC, station 1',
-                 'full duplex, BCC, station 3', 'full duplex, BCC, station 1',
-                 *(f'half duplex, CRC, station {number}' for number in (3, 1, 4))]
+    one_speed = ['full duplex, CRC, station 3', 'full duplex, CRC, station 0',
+                 'full duplex, BCC, station 3', 'full duplex, BCC, station 0',
+                 *(f'half duplex, CRC, station {number}' for number in (0, 3, 1))]
     assert trying == 2 * [f'{baud} baud, {text}' for baud in (19200, 9600) for text in one_speed]
     assert search.traces == []
 
@@ -113,16 +111,6 @@ def test_search_ends_with_the_first_answer(tmp_path: Path, duplex: Duplex, check
     assert len(trying) == tried
 
 
-@pytest.mark.usefixtures('half_duplex_only')
-def test_lost_poll_is_no_reason_to_find_nothing(tmp_path: Path, leap: Leap) -> None:
-    trying = Trying()
-    plc = simulated_plc(1, 'SLC', lambda: 0.0)
-    with plc_line(tmp_path / 'line', plc, around=lambda port: LosesPolls(port, [1], leap)) as name:
-        found = Search(replace(LOSSY, com_port=name), [1], trying).run([9600])
-    assert found is not None and found.settings == LineSettings(9600, 'Master', 'CRC')
-    assert trying[-1] == '9600 baud, half duplex, CRC, station 1'
-
-
 class Particular(FullDuplexPeer):
     """A full-duplex port that passes over what is not for its own station."""
 
@@ -130,15 +118,6 @@ class Particular(FullDuplexPeer):
 
     def _message(self, frame: Frame) -> bytes:
         return super()._message(frame) if frame.data[:1] == bytes((self.station,)) else b''
-
-
-def test_full_duplex_port_that_compares_stations_is_found(tmp_path: Path) -> None:
-    trying = Trying()
-    with plc_on(tmp_path / 'line', 'CRC', Duplex.FULL, Particular) as network:
-        found = Search(network, range(8), trying).run([9600])
-    assert found is not None
-    assert (found.settings.mode, found.presence.station) == ('Peer', 1)
-    assert trying == ['9600 baud, full duplex, CRC, station 1']  # that of plc without --station
 
 
 class Other(Particular):
@@ -174,30 +153,33 @@ def test_radio_modem_is_found_by_replies_without_ack(
 
 
 class Unheard(FullDuplexPeer):
-    """A full-duplex port whose first ACKs are lost, or all."""
-
-    most = 1000
+    """A full-duplex port whose ACKs are lost."""
 
     def _respond(self, response: bytes) -> bytes:
         response = super()._respond(response)
-        self.most -= response == ACK
-        return b'' if response == ACK and self.most >= 0 else response
+        return b'' if response == ACK else response
 
 
-class UnheardForAWhile(Unheard):
-    """One whose ACKs come again after a while."""
-
-    most = 3
-
-
-@pytest.mark.parametrize('kind', [Unheard, UnheardForAWhile])
 def test_full_duplex_port_whose_acks_are_lost_is_not_radio(
-        tmp_path: Path, kind: type[Unheard], monkeypatch: pytest.MonkeyPatch) -> None:
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(detect, 'ENQ_TIME', 2.5)  # it asks after 0.1 s
-    with plc_on(tmp_path / 'line', 'CRC', Duplex.FULL, kind) as network:
+    with plc_on(tmp_path / 'line', 'CRC', Duplex.FULL, Unheard) as network:
         found = Search(network, [1]).run([9600])
     assert found is not None
     assert found.settings.mode == 'Peer'
+    for at, later, mode in ((1, 'polls', 'Peer'), (0, 'acks', 'Peer'), (0, 'naks', 'Peer'),
+                            (0, 'enqs', 'Peer'), (0, 'polls', 'Radio')):
+        sessions = [Mock(echoes=False, counters=Counters()) for _ in range(2)]
+        sessions[0].counters.acks_received = at
+        setattr(sessions[1].counters, f'{later}_received', 1)
+        monkeypatch.setattr(detect, 'Session', MagicMock(**{
+            'return_value.__enter__.side_effect': sessions}))
+        monkeypatch.setattr(detect, 'ENQ_TIME', 0)
+        monkeypatch.setattr(detect, 'look_at', lambda _, station: Presence(
+            station, 0.0, None, None, is_there=True, takes_commands=True))
+        monkeypatch.setattr(detect, 'understands', lambda *_: True)
+        found = Search(Network(), [1]).run([9600])
+        assert found is not None and found.settings.mode == mode
 
 
 def test_full_duplex_port_with_another_station_is_heard_all_the_same(tmp_path: Path) -> None:
@@ -205,53 +187,6 @@ def test_full_duplex_port_with_another_station_is_heard_all_the_same(tmp_path: P
         search = Search(network, [5])
         assert search.run([9600], ['Peer'], ['CRC']) is None
     assert search.traces == ['9600 baud, full duplex, CRC: 4 characters came']  # NAKs to ENQs
-
-
-def test_flood_of_acks_is_no_plc(tmp_path: Path) -> None:
-    line = Pty(tmp_path / 'line')
-    over = threading.Event()
-
-    def flood() -> None:
-        while not over.wait(0.005):
-            line.write(b'\x10\x06')
-
-    flooding = threading.Thread(target=flood)
-    flooding.start()
-    try:
-        search = Search(Network(com_port=str(line.name), timeout=100), [0, 1])
-        assert search.run([9600], ['Peer'], ['CRC']) is None
-    finally:
-        over.set()
-        flooding.join()
-        line.close()
-    assert len(search.traces) == 1
-
-
-@pytest.mark.parametrize('is_first_at_once', [True, False])
-def test_own_characters_that_come_back_late_are_no_trace(
-        tmp_path: Path, is_first_at_once: bool) -> None:
-    line, over = Pty(tmp_path / 'line'), threading.Event()
-    search = Search(Network(com_port=str(line.name), timeout=300), [1, 2])
-
-    def give_back() -> None:
-        is_late = not is_first_at_once  # one of the two speeds is tried in time
-        while not over.is_set():
-            if select.select([line], [], [], 0.01)[0]:
-                sent = os.read(line.fileno(), 100)
-                over.wait(0.5 if is_late else 0)
-                line.write(sent)
-            is_late = search.echoes if is_first_at_once else not search.traces
-
-    echo = threading.Thread(target=give_back)
-    echo.start()
-    try:
-        assert search.run([9600, 19200]) is None
-    finally:
-        over.set()
-        echo.join()
-        line.close()
-    assert search.echoes
-    assert search.traces == []
 
 
 def test_characters_of_before_an_echo_was_seen_are_no_trace(
@@ -264,6 +199,7 @@ def test_characters_of_before_an_echo_was_seen_are_no_trace(
         def __init__(self, network: Network, absent: object = ()) -> None:
             self.echoes = network.baud == 19200
             assert network.cmd_timeout == max(500, network.timeout)
+            assert (network.nak_retries, network.enq_retries) == (0, 1)
             self.counters.chars_received = 4
 
         def __enter__(self) -> 'EchoedSession':
@@ -272,9 +208,10 @@ def test_characters_of_before_an_echo_was_seen_are_no_trace(
         def __exit__(self, *exception: object) -> None:
             """Close nothing."""
 
-    absent = Presence(1, 0.0, None, None, is_there=False, takes_commands=False)
+    absent = Presence(1, 0.0, None, None, is_there=False, takes_commands=True)  # ACKs, no reply
     monkeypatch.setattr(detect, 'Session', EchoedSession)
     monkeypatch.setattr(detect, 'look_at', lambda session, station: absent)
+    monkeypatch.setattr(detect, 'understands', lambda *_: False)
     assert Search(Network(timeout=800), [1]).run([9600]) is None
     search = Search(Network(timeout=100), [1])
     assert search.run([9600]) is None
@@ -283,14 +220,20 @@ def test_characters_of_before_an_echo_was_seen_are_no_trace(
     assert search.traces == []
 
 
-@pytest.mark.usefixtures('half_duplex_only')
-def test_traces_of_the_wrong_settings(tmp_path: Path) -> None:
-    with plc_on(tmp_path / 'line', 'BCC', Duplex.HALF) as network:
-        search = Search(network, [1])
-        assert search.run([9600], checks=['CRC']) is None
-    # Of 256 CRCs one is a good BCC, too: then the PLC replies, and more than two EOTs come.
-    (trace,) = search.traces
-    assert re.fullmatch(r'9600 baud, half duplex, CRC: (4|\d{2,}) characters came', trace)
+def test_only_options_and_urls_keep_a_search_from_trying_all(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(detect, 'overhear', heard := Mock(return_value=None))
+    monkeypatch.setattr(detect, 'Search', search := Mock(**{'return_value.echoes': False}))
+    (net := tmp_path / 'net.csv').write_text(
+        'Com_Port,Baud,Error_Code,Mode\n/x,2400,BCC,Master\n', 'utf-8')
+    for more, bauds, modes, checks in (
+            ((), BAUD_RATES, ['Peer', 'Master'], ('CRC', 'BCC')),
+            (('--baud', '9600', '--duplex', 'full'), [9600], ['Peer'], ('CRC', 'BCC')),
+            (('--port', 'socket://h:1', '--check', 'crc'), [2400], ['Peer', 'Master'], ['CRC'])):
+        options = make_parser('').parse_args(['detect', '--net', str(net), *more])
+        detect.found_settings(options, line := network_of(options))
+        assert search.return_value.run.call_args[0] == (bauds, modes, checks)
+        assert heard.call_args[0][:2] == (line, bauds)
 
 
 KE = bytes.fromhex('00 FE 19 00 00 00 10 00 20 00')

@@ -18,6 +18,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 import time
+from unittest.mock import MagicMock, Mock
 
 from abdf1_ros.cli.plc.command import main
 from abdf1_ros.cli.plc.detect import Found, LineSettings
@@ -130,10 +131,12 @@ def test_plc_of_an_unknown_family_leaves_no_later_one_out() -> None:
     assert rows.endswith('\n# n7_3,Read,N7:0,3,SLC,5/02,41,5000,,,\n')
 
 
+KE = gateways.decode(bytes.fromhex('00 FE 19 00 00 00 10 00 20 00'))
+
+
 def test_gateway_leads_to_the_nodes_behind_it() -> None:
-    gateway = gateways.decode(bytes.fromhex('00 FE 19 00 00 00 10 00 20 00'))
     there = [Presence(number, 0.0, identity, None, True, True)
-             for number, identity in ((8, gateway), (9, None))]
+             for number, identity in ((8, KE), (9, None))]
     for mode, scan, via in (
             ('Master', '0-63 --via 8', 'Via 8'), ('Radio', '0-63', 'an empty Via')):
         rows = ''.join(map_rows(there, {}, mode))
@@ -199,6 +202,28 @@ def test_lost_poll_leaves_no_station_out(tmp_path: Path, capsys: Output, leap: L
     assert 'station 2: SLC 5/03 series A revision 1, REM RUN, asked 2 times' in said
     mappings, _ = load_mappings(str(tmp_path / 'map.csv'))
     assert [mapping.station for mapping in mappings] == [1, 2]
+
+
+def test_stations_of_a_radio_line_are_asked_too_and_stand_in_order(
+        tmp_path: Path, capsys: Output, monkeypatch: pytest.MonkeyPatch) -> None:
+    gateway, *plcs = (Presence(number, 0.1, identity, None, True, True) for number, identity in (
+        (3, KE), (5, None), (4, Identity(PlcType.SLC, 'SLC 5/03'))))
+    silent = replace(plcs[0], station=9, is_there=False, asked=2)
+    monkeypatch.setattr(init, 'found_settings', lambda *_: Found(
+        LineSettings(9600, 'Radio', 'BCC'), plcs[0]))
+    monkeypatch.setattr('abdf1_ros.cli.plc.presence.scan', scan := Mock(
+        return_value=[plcs[1], silent, gateway]))
+    monkeypatch.setattr('abdf1_ros.cli.plc.files.listed', lambda *_: [])
+    monkeypatch.setattr(init, 'Session', session := MagicMock())
+    assert main(['init', '--port', '/x', '--into', str(tmp_path), '--stations', '2-4,9']) == 0
+    line = session.call_args[0][0]
+    assert (line.baud, line.mode, line.error_code) == (9600, 'Radio', 'BCC')
+    assert scan.call_args[0] == (line, (2, 3, 4, 9))
+    said = capsys.readouterr().out.splitlines()
+    assert said[1] == '3 of 5 stations answer; silent stations were asked 2 times'
+    assert [text[:16] for text in said[2:5]] == [f'station {number}: {text}' for number, text in (
+        (3, '1785-'), (4, 'SLC 5'), (5, 'answe'))]
+    assert 'plc watch S:0 --station 4 --net' in said[7]
 
 
 def test_init_leaves_files_alone_that_are_there(port: str, tmp_path: Path, capsys: Output) -> None:
