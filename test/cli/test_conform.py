@@ -96,13 +96,14 @@ def test_failures_skips_noise_and_early_enquiries_are_told(
         yield CaseResult(cases[0], Verdict.SKIP, got='needs a word')
 
     monkeypatch.setattr('abdf1_ros.cli.conform.run_cases', results)
-    unknown = Mock(return_value=decode_identity(b'\xEE\x34'))
+    unknown = Mock(return_value=decode_identity(b'\2\x14' + bytes(8)))
     monkeypatch.setattr('abdf1_ros.cli.conform.decode_identity', unknown)
     permissions, words = {*Permission}, Words(999, 9, 41)
     for options, missing, *told in (
-            (['--yes', '--words', 'n999:9', '--count', '41'], set(), 'we   10 05\n', ' skipped: needs a word\n'),
+            (['--yes', '--words', 'n999:9', '--count', '41'], set(), 'we   10 05\n',
+             ' skipped: needs a word\n'),
             (['--yes', '--report'], {Permission.WRITE}, ' | expected ACK, got NAK |'),
-            (['--report'], {Permission.RESET}, ' | needs a word |', ': unknown processor\n')):
+            (['--report'], {Permission.RESET}, ' | needs a word |', ': PLC-2 at 1771-KG series')):
         permissions -= missing
         assert main(['slave', '--port', port, '--answer-time', '1.5', *options]) == 1
         said = capsys.readouterr()
@@ -130,12 +131,6 @@ def test_echo_that_comes_byte_by_byte_is_not_an_answer(
         write=sent.extend, read=lambda *wait: bytes([sent.pop(0)]) if sent else b''))
     assert main(['slave', '--port=/x', '--only=poll-idle', '--answer-time=0.01', '--echo']) == 1
     assert 'no byte was received' in capsys.readouterr().err
-
-
-def test_processor_of_another_family_is_not_read(tmp_path: Path, capsys: Output) -> None:
-    with plc_line(tmp_path / 'plc', simulated_plc(1, 'PLC2', time.monotonic)) as port:
-        assert main(['slave', '--port', port, '--only', 'read-words']) == 1
-    assert 'skipped: needs --family PLC5 or SLC' in capsys.readouterr().out
 
 
 def test_nobody_there_is_said(tmp_path: Path, capsys: Output) -> None:

@@ -18,7 +18,6 @@ from collections.abc import Iterator
 from contextlib import suppress
 from io import BytesIO
 from itertools import count
-import json
 import os
 from pathlib import Path
 import re
@@ -293,7 +292,7 @@ def test_tap_between_the_simulator_and_a_master(tmp_path: Path, capsys: Output) 
         os.write(line, frames.ACK)
         wait_until(lambda: len(_printed(sniff)) == 5)
         os.close(line)
-        sniff.end()
+        sniff.end(signal.SIGTERM)
     said = _printed(sniff)
     assert [entry.split()[1:4] for entry in said[:5]] == [
         ['>', '2', 'command'], ['<', '2', 'ACK'], ['>', '2', 'poll'], ['<', '2', 'reply'],
@@ -308,19 +307,6 @@ def test_tap_between_the_simulator_and_a_master(tmp_path: Path, capsys: Output) 
         assert all(entry in content for entry in (SAID[0], SAID[2], heard))
         packets = PacketFile(path, BytesIO(content)).packets()
         assert min(packet.time for packet in packets) > time.time() - 600
-
-
-def test_port_until_a_signal(tmp_path: Path) -> None:
-    pty = Pty(tmp_path / 'line')
-    with Process('sniff', '--port', str(pty.name), '--json') as sniff:
-        sniff.wait_for('sniff: ')
-        pty.write(b''.join(SAID))
-        wait_until(lambda: len(sniff.lines) == 6)
-        sniff.end(signal.SIGTERM)
-    pty.close()
-    assert [json.loads(line)['kind'] for line in _printed(sniff)] == [
-        'command', 'ACK', 'poll', 'reply', 'ACK', 'summary']
-    assert len(_told(sniff)) == 1
 
 
 @pytest.mark.parametrize(('way', 'number'), [

@@ -126,12 +126,11 @@ def test_other_family_refuses(family: str, outcome: tuple[Verdict, str, str], na
 def test_case_that_needs_leave_or_comes_too_late_is_skipped() -> None:
     line = ScriptedLine(plc_of(Target.SLAVE, 'CRC'))
     wire = Wire(line, BlockCheck.CRC, line.clock, is_half_duplex=True)
-    case = next(case for case in CASES if case.name == 'nak-resets')
-    result, = run_cases([case], wire, MasterEnd(wire, 1, 5, first_tns=1),
-                        frozenset((Permission.NOTHING,)))
+    case, end = next(case for case in CASES if case.name == 'nak-resets'), MasterEnd(wire, 1, 5, 1)
+    result, = run_cases([case], wire, end, frozenset((Permission.NOTHING,)))
     assert (result.verdict, result.got[:11]) == (Verdict.SKIP, 'needs --yes')
     assert line.read(600.0) == b''  # the target is asked for its identity before
-    results = run_cases(2 * [case], wire, MasterEnd(wire, 1, 5, first_tns=1), frozenset(Permission))
+    results = run_cases(2 * [case], wire, end, frozenset(Permission))
     assert [result.got for result in results] == 2 * ['not tried: the run has taken too long']
 
 
