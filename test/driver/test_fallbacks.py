@@ -345,6 +345,8 @@ def test_rule_2_message_before_the_last_fallback_makes_no_row_fresh() -> None:
     assert cell.word('N7:0') == 7
     after = [(name, bool(value)) for when, name, value in cell.writes if when >= since]
     assert after.index(('N7:0', True)) < after.index(('N10:0', True))
+    cell.publish(speed, 5, run=0.5)
+    assert cell.results()[-1] == 'written'
 
 
 @for_all('outcome', [Outcome.UNKNOWN, Outcome.PARTLY])
@@ -842,7 +844,8 @@ def test_rule_7_old_message_of_a_serve_row_is_not_stored() -> None:
 def test_rule_12_fallback_of_a_serve_row_goes_into_our_own_table(ours: int, theirs: int) -> None:
     served = make_mapping('N7:0', 'Serve', station=ours, fallback=FALLBACK)
     plain = make_mapping('N7:1', 'Serve', station=ours)
-    cell = GuestCell(served, plain, make_mapping('N7:0', 'Write', station=theirs), run=0.1)
+    other = make_mapping('N7:2', 'Serve', station=ours, fallback=Fallback((8,), 60_000))
+    cell = GuestCell(served, plain, other, make_mapping('N7:0', 'Write', station=theirs), run=0.1)
     words = cell.bench.driver.served.words_of
     assert words(served) == b'\7\0'
     cell.publish(served, 3, run=0.2)
@@ -851,11 +854,11 @@ def test_rule_12_fallback_of_a_serve_row_goes_into_our_own_table(ours: int, thei
     assert words(served) == b'\3\0'
     cell.run(0.3)
     assert words(served) == b'\7\0'
-    assert cell.results() == [START, 'written', TIMEOUT]
-    for row in (served, plain):
+    assert cell.results() == [START, START, 'written', TIMEOUT]
+    for row in (served, plain, other):
         cell.publish(row, 3)
     cell.bench.driver.interlocks.forget_served()
-    assert words(served) + words(plain) == b'\7\0\0\0'
+    assert words(served) + words(plain) + words(other) == b'\7\0\0\0\x08\0'
 
 
 def test_rule_17_fallback_has_one_result_and_its_retries_have_none() -> None:

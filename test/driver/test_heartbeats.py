@@ -168,7 +168,9 @@ def test_rule_3d_required_topic_that_falls_silent_is_0_at_once(polling: str) -> 
 
 def test_rule_3_beat_is_not_sent_when_it_may_be_wrong_by_then() -> None:
     speed = speed_row(Fallback((7,), 3000))
-    cell = Cell(beat_row(2000, requires=['speed'], timeout=5000), speed)
+    slow = speed_row(Fallback((7,), 60_000), 'N7:5', 'slow')
+    cell = Cell(beat_row(2000, requires=['speed'], timeout=5000), slow, speed)
+    cell.publish(slow, 3, times=2)
     cell.publish(speed, 3, times=100, run=5.0)
     interlocks, now = cell.bench.driver.interlocks, cell.now
     beat = interlocks.heartbeats[0]
@@ -179,8 +181,9 @@ def test_rule_3_beat_is_not_sent_when_it_may_be_wrong_by_then() -> None:
         interlocks.conditions.messages['speed'] = message
         beat.next_beat = now
         interlocks.plcs[1].look_again(beat)
+        interlocks.beats_gave_way()
         own = interlocks.next(now)
-        assert own is not None
+        assert own is not None and not interlocks.conditions.is_beats_turn
         assert own.write.mapping is beat.mapping
         own.result = own.write.result(Outcome.NOT_SENT)
         own.ended(None)
@@ -191,6 +194,9 @@ def test_rule_3_beat_is_not_sent_when_it_may_be_wrong_by_then() -> None:
     assert expires(now + 9.0, now + 9.0) == now + 3.0  # of the fallback: a message waits
     interlocks.message_came(Write(speed, [3], now))  # an older one that came late
     assert interlocks.conditions.messages['speed'] == now + 9.0
+    interlocks.conditions.messages['speed'] = now - 5.01
+    interlocks.message_came(Write(speed, [3], now - 0.02))  # published in time
+    assert beat.state is BeatState.COUNTS
     beat.take(now)
     interlocks.contact(1, now)
     assert interlocks.next(now) is None  # the 0 waits for the end of the beat
@@ -275,7 +281,7 @@ def test_rule_3d_message_that_a_fallback_has_overruled_does_not_count() -> None:
     cell = Cell(beat_row(requires=['speed'], timeout=5000), speed, run=2.0)
     assert set(cell.written('N10:0')) == {0}
     cell.bench.driver.interlocks.fallbacks[0].sent = cell.now
-    cell.bench.write(speed, [3], run=1.0, age=0.1)
+    cell.bench.write(speed, [3], run=1.0)  # at the same moment
     assert cell.results()[-1] == 'not written: not sent: fallback'
     assert set(cell.written('N10:0')) == {0}
 

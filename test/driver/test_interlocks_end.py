@@ -17,6 +17,7 @@
 import math
 
 from abdf1_ros.df1.packet import Packet
+from abdf1_ros.driver.write import Write
 from abdf1_ros.driver.writes.under_way import WriteJob
 from abdf1_ros.settings.heartbeats import Fallback, LAST_ANSWER
 import pytest
@@ -181,11 +182,15 @@ def test_rule_5_end_asks_a_silent_plc_too_where_another_has_its_own_rows() -> No
     assert line.driver.interlocks.unconfirmed() == ['speed1']
 
 
-@pytest.mark.parametrize(('ends', 'answer_within'), [(False, math.inf), (True, LAST_ANSWER)])
-def test_rule_5_last_try_at_a_silent_plc_is_short(ends: bool, answer_within: float) -> None:
+@pytest.mark.parametrize(('ends', 'is_silent', 'answer_within'), [
+    (False, True, math.inf), (True, False, math.inf), (True, True, LAST_ANSWER)])
+def test_rule_5_last_try_at_a_silent_plc_is_short(
+        ends: bool, is_silent: bool, answer_within: float) -> None:
     driver = Cell(speed_row(), start=False).bench.driver
     driver.interlocks.begin(0.0)
-    driver.stations.lost(1, 0.0)
+    if is_silent:
+        driver.stations.lost(1, 0.0)
+    assert driver.interlocks.is_put_off(Write(driver.mappings[0], [3], 0.0)) is is_silent
     if ends:
         driver.interlocks.wind_down()
     job = driver.interlocks.next(0.0)
