@@ -843,7 +843,7 @@ def test_rule_7_old_message_of_a_serve_row_is_not_stored() -> None:
 @pytest.mark.parametrize(('ours', 'theirs'), [(5, 255), (1, 1)])
 def test_rule_12_fallback_of_a_serve_row_goes_into_our_own_table(ours: int, theirs: int) -> None:
     served = make_mapping('N7:0', 'Serve', station=ours, fallback=FALLBACK)
-    plain = make_mapping('N7:1', 'Serve', station=ours)
+    plain = make_mapping('N9:1', 'Serve', station=ours)
     other = make_mapping('N7:2', 'Serve', station=ours, fallback=Fallback((8,), 60_000))
     cell = GuestCell(served, plain, other, make_mapping('N7:0', 'Write', station=theirs), run=0.1)
     words = cell.bench.driver.served.words_of
@@ -856,7 +856,7 @@ def test_rule_12_fallback_of_a_serve_row_goes_into_our_own_table(ours: int, thei
     assert words(served) == b'\7\0'
     assert cell.results() == [START, START, 'written', TIMEOUT]
     for row in (served, plain, other):
-        cell.publish(row, 3)
+        cell.publish(row, 3, run=0.01)
     cell.bench.driver.interlocks.forget_served()
     assert words(served) + words(plain) + words(other) == b'\7\0\0\0\x08\0'
 

@@ -130,15 +130,17 @@ def test_two_ports_hear_full_duplex() -> None:
     assert bench.values(mapping) == [[1, 2], [9, 2]]
 
 
-@pytest.mark.parametrize('tns', [7, 8])
-def test_on_two_ports_a_number_that_is_used_again_tells_nothing(tns: int) -> None:
+@pytest.mark.parametrize(('tns', 'before', 'values'), [
+    (7, 5, []), (8, 5, [[99]]), (7, 0, [[99]])])  # the last is the same command once more
+def test_on_two_ports_a_number_that_is_used_again_tells_nothing(
+        tns: int, before: int, values: list[list[int]]) -> None:
     mapping = row('N7:0', 1)
     bench = ListeningBench([mapping], has_two_ports=True)
     # What is read after it may have been said before it: the reply is to the first command.
-    bench.hear(frame(command(7, 'A2 02 07 89 05 00')))
+    bench.hear(frame(command(7, f'A2 02 07 89 0{before} 00')))
     bench.hear(frame(command(tns, 'A2 02 07 89 00 00')))
     bench.hear(frame(reply(tns, '63 00')), from_far=True)
-    assert bench.values(mapping) == ([] if tns == 7 else [[99]])
+    assert bench.values(mapping) == values
 
 
 def test_numbers_that_tell_nothing_are_forgotten_with_their_commands() -> None:
@@ -171,7 +173,7 @@ def test_reply_counts_only_with_its_command() -> None:
 
 @for_all('between', [
     b'\x10\x02\x01\x00\x0F\x00\x07\x00\xA2\x10\x03\x00\x00',  # a frame with a wrong check
-    b'\xAA\x55\xAA\x55', Damaged(b'A'), b'\x10\x02\x01\x05'])
+    b'\xAA\x55\xAA', Damaged(b'A'), b'\x10\x02\x01\x05'])
 def test_damage_between_command_and_reply_makes_it_unsure(between: bytes) -> None:
     bench, mapping = listening()
     # A master that never changes its number: what was damaged may have been another command.
@@ -181,7 +183,7 @@ def test_damage_between_command_and_reply_makes_it_unsure(between: bytes) -> Non
     bench.hear(frame(reply(7, VALUES)), after=0.3)
     assert bench.values(mapping) == []
     bench.hear(frame(command(7, READ_N7_0), 1))
-    bench.hear(b'\x00')  # a glitch of a transmitter, which does no harm
+    bench.hear(b'\x00\x00')  # a glitch of a transmitter, which does no harm
     bench.hear(frame(reply(7, VALUES)))
     assert bench.values(mapping) == [[1, 2, 3, 4]]
 
@@ -259,8 +261,10 @@ def test_refused_read_and_reply_without_known_words_fill_nothing(
     bench = ListeningBench([mapping])
     exchange(bench, 7, asked, answered, cmd=cmd, sts=sts)
     assert bench.values(mapping) == []
+    exchange(bench, 8, READ_N7_0, VALUES, station=2)  # of no row
     heard = int(sts != 0x02)
-    assert (bench.driver.stations[1].replies, bench.driver.tasks.transactions) == (heard, heard)
+    assert (bench.driver.stations[1].replies, bench.driver.tasks.transactions) == (
+        heard, heard + 1)
 
 
 def test_rows_that_no_node_reads_are_named() -> None:
@@ -387,14 +391,16 @@ def test_what_comes_faster_than_the_line_brings_it_is_old_until_half_a_second_wi
 
 
 def test_row_that_no_node_reads_is_named_after_each_opening() -> None:
-    mapping = row()
-    bench = ListeningBench([mapping])
+    mapping, read = row('N7:100'), row(length=4)
+    bench = ListeningBench([mapping, read])
+    exchange(bench, 7, READ_N7_0, VALUES)
     for failures in (1, 4):
         bench.run(9.9)
         assert bench.driver.points[mapping].error != 'no other node reads it'
         bench.run(20.1)
         assert bench.driver.points[mapping].error == 'no other node reads it'
         assert bench.driver.points[mapping].failures == failures
+        assert (bench.driver.points[read].error or '').endswith('reads it') is (failures == 4)
         bench.driver.ended(PortLost('unplugged'))
         assert bench.driver.points[mapping].error == 'port lost: unplugged'
         bench.machine.start(bench.now)

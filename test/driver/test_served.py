@@ -305,11 +305,11 @@ def test_command_for_several_words_is_published_once_and_all_or_nothing() -> Non
     assert slc.heard() == [('B3:0_5_Serve_2', [0x0F, 0x0F])]
     assert slc.ask(0x0F, bytes.fromhex('AB 04 03 85 01 00 0F 00 00 00 00 00')) == BAD_WORDS['SLC']
     assert slc.heard() == []
-    plc5 = Bench('PLC5', row('B3:0', length=2))
+    plc5 = Bench('PLC5', row('B3:0', length=2), row('B3:1'))
     sets = '07 00 03 {:02X} FF FF 01 00'
     both = bytes.fromhex('26' + sets.format(0) + sets.format(1))
     assert plc5.ask(0x0F, both) == (0, b'')
-    assert plc5.heard() == [('B3:0_5_Serve_2', [1, 1])]
+    assert plc5.heard() == [('B3:0_5_Serve_2', [1, 1]), ('B3:1_5_Serve_1', [1])]
     beyond = bytes.fromhex('26' + sets.format(1) + sets.format(2))
     assert plc5.ask(0x0F, beyond) == BAD_WORDS['PLC5']
     assert plc5.heard() == []
@@ -320,11 +320,11 @@ def test_command_for_several_words_is_published_once_and_all_or_nothing() -> Non
 
 def test_new_files_keep_the_words_of_their_rows() -> None:
     before = Bench('SLC', row('N7:50', 'SLC', 4), row('B3:5/0', 'SLC', 8), row('N9:0', 'SLC'))
-    before.write('N7:50', 5, 6, 7, 8)
+    before.write('N7:50', 5, 6, 0x107, 8)
     before.write('B3:5', 0x8081)
-    after = Bench('SLC', row('N7:52', 'SLC', 3), row('B3:5/4', 'SLC', 20), row('F8:0', 'SLC'))
+    after = Bench('SLC', row('N7:52', 'SLC', 3), row('B3:5/4', 'SLC', 20), row('B3:5/0', 'SLC'))
     after.served.take_over(before.served)
-    assert after.read('N7:52', 3) + after.read('B3:5') == b'\7\0\x08\0\0\0\x80\0'
+    assert after.read('N7:52', 3) + after.read('B3:5') == b'\7\1\x08\0\0\0\x81\0'
 
 
 def test_refused_command_is_undone_in_each_of_its_words() -> None:
@@ -357,9 +357,9 @@ PROTECTED = {'PLC5': (0xF0, b'\x0B'), 'SLC': (0x50, b''), 'PLC3': (0xF0, b'\x1E'
 
 @for_all('plc', PROTECTED)
 def test_row_that_the_other_end_may_only_read(plc: str) -> None:
-    first, second = ('020', '021') if plc == 'PLC2' else ('N7:0', 'N7:1')
-    mine = replace(row(first, plc), is_read_only=True)
-    bench = Bench(plc, mine, row(second, plc))
+    first, second, third = [f'02{n}' if plc == 'PLC2' else f'N7:{n}' for n in range(3)]
+    mine, other = (replace(row(text, plc), is_read_only=True) for text in (first, third))
+    bench = Bench(plc, mine, row(second, plc), other)
     bench.served.store(mine, [5])
     assert bench.write(first, 9) == PROTECTED[plc]
     assert bench.write_bits(first, 0xFFFF, 1) == PROTECTED[plc]
