@@ -189,13 +189,14 @@ def test_refusal_or_reply_that_is_no_status_is_told_and_no_fault_of_the_station(
     assert bench.driver.points[bench.driver.mappings[0]].freshness(bench.clock()) \
         is Freshness.FRESH
     ears.answer_diagnostics(plc.serve)
+    bench.driver.checks.request_counters(1)
     bench.run(PERIOD)
     assert bench.driver.checks.known(1).identity is not None
     ears.answer_diagnostics(lambda command: command.reply(b'\x06'))
     bench.run(PERIOD)
     known = bench.driver.checks.known(1)
-    assert (known.processor, known.identity, known.told) == (
-        'unknown (a diagnostic status of 1 bytes)', None, None)
+    assert (known.processor, known.identity, known.told, bool(known.counters)) == (
+        'unknown (a diagnostic status of 1 bytes)', None, None, True)
 
 
 def test_station_that_never_answers_this_is_asked_rarely() -> None:
