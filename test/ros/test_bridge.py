@@ -269,6 +269,3 @@ def test_processor_that_runs_no_program_is_a_warning(bridge: Bridge) -> None:
             'WARN: station 2 active, but in program mode (REM PROG)')
         assert details(status)['processor'] == 'SLC 5/03 series A revision 1, REM PROG'
         bridge.simulator.say('mode 2 run')
-
-
-# Parameters

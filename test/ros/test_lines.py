@@ -189,6 +189,8 @@ def test_line_is_started_again_once_after_each_internal_error(
         start_one(lines)
         assert len(made) == count
     assert (line.restarts, other.restarts) == (2, 2)
+    line.due, line.closing = 0.0, threading.current_thread()
+    assert not line.is_due
     line.closing = threading.Timer(0.1, list)
     line.closing.start()
     line.end_callbacks(time.monotonic() + PATIENCE)
