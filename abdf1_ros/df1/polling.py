@@ -81,11 +81,10 @@ class _PollList:
     is_kept_waiting: bool = False
 
     def turn(self, now: float) -> None:
-        """Begin the next scan at the first station, and record the time of the last scan."""
+        """Begin the next scan, and record the time of the last scan."""
         if self.started is not None:
             self.times.add(now - self.started)
         self.started = now
-        self.position = 0
 
     def inactive(self, is_active: Callable[[int], bool]) -> int | None:
         """Return the inactive station whose turn it is, or None when all are active."""
