@@ -68,10 +68,6 @@ def test_station_keeps_what_was_heard_of_it() -> None:
     assert (station.replies, station.last_heard) == (1, 101.0)
 
 
-def test_station_keeps_since_when_it_is_silent() -> None:
-    assert played('master_command_limit_2').stations[17].silent_since == pytest.approx(102.0)
-
-
 def test_replies_that_are_late_in_a_row_are_counted_until_one_is_not() -> None:
     assert played('master_timeout_1').stations[17].overdue == 1
     assert played('master_timeouts').stations[17].overdue == 0

@@ -179,17 +179,6 @@ def test_messages_for_the_dead_do_not_slow_the_living(standard: bool, listed: bo
 
 
 @BOTH
-def test_station_is_brought_back_by_a_message_for_it(standard: bool) -> None:
-    rig = bench(standard, 7)
-    rig.put(8)
-    command = rig.message(7, 8)
-    rig.start(8)
-    poll(rig, 7)
-    assert rig[8].served == [command]
-    assert rig.master.stations[8].active
-
-
-@BOTH
 def test_message_that_a_gateway_does_not_take_says_nothing_about_the_gateway(
         standard: bool) -> None:
     rig = bench(standard, 7, 9)

@@ -205,6 +205,9 @@ def test_command_that_may_have_waited_while_this_process_stood_still_has_to_come
     for executed in (0, 0, 1):
         bench.hear(framed(THEIRS))
         assert (len(bench.wait(0.25)), len(bench.executed)) == (executed, executed)
+    bench.machine.start(bench.now)  # and the other nodes, too
+    bench.hear(framed(THEIRS))
+    assert bench.executed[PLC, THEIRS.tns] == 2
 
 
 def test_command_for_which_there_is_no_room_is_not_executed() -> None:
@@ -226,6 +229,9 @@ def test_what_has_not_left_when_the_port_is_lost_is_undelivered(unsent: int) -> 
     Wire(bench.machine, unsent=lambda: unsent).attach(bench.now)
     bench.machine.stop(PortLost('the line takes nothing'))
     assert bench.machine.counters.unsent_messages == (unsent > 0)
+    bench.machine.start(bench.now)
+    bench.begin(COMMAND)
+    assert bench.wait(0.2) == [framed(COMMAND)]
 
 
 def test_line_that_is_not_quiet_is_waited_for_but_not_for_ever() -> None:

@@ -60,15 +60,6 @@ class Line:
         return message_frame(self.reply(command, command.dst).encode(), Checksum.CRC)
 
 
-def test_only_the_addressed_station_answers() -> None:
-    line = Line(1, 7, 8)
-    assert line.send(FROM_MASTER) == ACK
-    assert line.say(poll_frame(8)) == EOT
-    assert line.say(poll_frame(7)) == line.frame(FROM_MASTER)
-    assert line.say(poll_frame(9)) == b''
-    assert line.machine.deadline is None
-
-
 def test_ack_goes_to_the_station_that_spoke() -> None:
     line, other = Line(7, 8), FROM_MASTER._replace(dst=8)
     assert (line.send(FROM_MASTER), line.send(other)) == (ACK, ACK)
