@@ -311,7 +311,7 @@ class LinkThread(threading.Thread):
                 end = RELEASED
             elif not self._stopping:
                 end = _READ_AGAIN
-                # Without a report: mostly the port is open at once. A name server may take minutes.
+                # Not reported: mostly the port is open at once, but a name server takes minutes.
                 self.state = PortState(False, 'the port is being opened')
             return True
         except OSError as error:

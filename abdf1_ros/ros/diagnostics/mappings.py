@@ -81,7 +81,8 @@ class MappingsStatus:
         values |= {f'left out {number}': str(problem)
                    for number, problem in enumerate(left_out, 1)}
         if more := len(self._left_out) - len(left_out):
-            values['left out, more'] = f'{counted(more, "more fault")}; the log and "check" have them all'
+            values['left out, more'] = (
+                f'{counted(more, "more fault")}; the log and "check" have them all')
         for point in points:
             tag = point.mapping.tag
             if point.freshness(now) is not Freshness.FRESH:
