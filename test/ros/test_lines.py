@@ -74,7 +74,7 @@ def yaml_file(folder: Path, text: str) -> str:
      ['/press/press_plc', '/press/other']),
     ('abdf1:\n  ros__parameters: {a: 1}', ['/abdf1']),
     ('/**:\n  ros__parameters: {a: 1}\n/*/x:\n  ros__parameters: {}', []),
-    ('lines:\n  ros__parameters: {lines: [x]}\nx/lines:\n  ros__parameters: {}\n'
+    ('lines:\n  ros__parameters: {lines: [x]}\nx/lines:\n  ros__parameters: {a: 1}\n'
      'host_b: {ros__parameters: {}}', ['/x/lines']),
     ('', [])])
 def test_nodes_of_a_parameter_file(tmp_path: Path, text: str, expected: list[str]) -> None:
