@@ -406,6 +406,8 @@ def test_tags_of_rsview_and_factorytalk(tmp_path: Path, text: str) -> None:
     text = text.replace('"PLC1","N7:1"', '"PLC2","N7:1"').replace('[PLC1]N7:1', '[PLC2]N7:1')
     with pytest.raises(ConfigurationError, match='rows of several PLCs: PLC1, PLC2'):
         imported(tmp_path, text)
+    bad = bad.replace('"PLC1","N7:1"', '"PLC2","N7:1"').replace('[PLC1]N7:1', '[PLC2]N7:1')
+    assert len(imported(tmp_path, bad, Wanted(node='PLC1'))[1]) == 1
 
 
 INTOUCH = (
@@ -441,7 +443,8 @@ def test_tags_of_intouch(tmp_path: Path) -> None:
 
 
 def test_rows_of_several_plcs_are_not_mixed(tmp_path: Path) -> None:
-    text = INTOUCH + '"Other","$System","",0,1,0,1,Linear,"PLC2",No,"N7:0",No\n'
+    text = INTOUCH.replace('Linear', 'Square Root') \
+        + '"Other","$System","",0,1,0,1,Linear,"PLC2",No,"N7:0",No\n'
     with pytest.raises(ConfigurationError, match='rows of several PLCs: PLC1, PLC2; .* --plc'):
         imported(tmp_path, text)
     (mapping,), left_out = imported(tmp_path, text, Wanted(node='PLC2'))
@@ -502,6 +505,8 @@ IGNITION = """\
 
 
 def test_tags_of_ignition(tmp_path: Path) -> None:
+    other = IGNITION.replace('[MLX]N7:1', '[SLC]N7:1')
+    assert [text[:3] for text in imported(tmp_path, other, Wanted(node='MLX'))[1]] == ['11:']
     (speed, wait), left_out = imported(tmp_path, IGNITION)
     assert [cell_of(speed, column) for column in (
         'Tag', 'Command', 'Address', 'Type', 'Scale', 'Offset', 'Description')] == [

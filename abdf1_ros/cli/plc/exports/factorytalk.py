@@ -65,25 +65,25 @@ def _found(record: Cells, wanted: Wanted) -> FoundRow | Ignored:
     tag = record.get('tag name', '').replace('\\', '/')
     if record.get('data source', '').upper() != 'D':
         return Ignored('tags without a PLC (memory and system)')
-    try:
-        return _of_device(tag, record, wanted)
-    except Unusable as error:
-        raise Unusable(str(error), tag) from None
-
-
-def _of_device(tag: str, record: Cells, wanted: Wanted) -> FoundRow:
     address, node = record.get('address', ''), record.get('node name', '')
     if match := _SHORTCUT.fullmatch(address):
         address, node = match['address'], match['node']
+    try:
+        return FoundRow(_cells(tag, address, record, wanted), node)
+    except Unusable as error:
+        raise Unusable(str(error), tag, node) from None
+
+
+def _cells(tag: str, address: str, record: Cells, wanted: Wanted) -> Cells:
     command = limited(command_of(record.get('read only', ''), 'read only') or READ, wanted)
     kind, unit = record.get('native type', '').lower(), record.get('units', '')
     if kind not in _TYPES:
         raise Unusable(f'Native Type "{shown(kind)}" has no counterpart')
-    return FoundRow(cells_of(
+    return cells_of(
         Tag=tag, Command=command, Address=address, Type=_TYPES[kind],
         Period=str(wanted.period or ''), Description=' '.join(filter(None, (
             record.get('tag description', ''), f'[{unit}]' * bool(unit)))),
-        **_numbers(record, command)), node)
+        **_numbers(record, command))
 
 
 def _numbers(record: Cells, command: str) -> Cells:

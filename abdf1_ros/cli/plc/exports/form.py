@@ -78,11 +78,15 @@ class Ignored:
 
 
 class Unusable(ValueError):
-    """The reason why a row that should have an address cannot be used; ``tag`` names the row."""
+    """
+    The reason why a row that should have an address cannot be used; ``tag`` names the row.
 
-    def __init__(self, text: str, tag: str = '') -> None:
+    ``node`` is the PLC that the file names for it, None if that is not known.
+    """
+
+    def __init__(self, text: str, tag: str = '', node: str | None = None) -> None:
         super().__init__(text)
-        self.tag = tag
+        self.tag, self.node = tag, node
 
 
 Reader = Callable[[Record], FoundRow | Ignored]

@@ -94,8 +94,8 @@ FORMAT = Format('tags of Ignition (Export Tags, JSON)', _reader)
 def _found(tag: Cells, wanted: Wanted) -> FoundRow | Ignored:
     if tag['valueSource'] != 'opc':
         return Ignored('tags that are not of a PLC')
+    match = _PATH.fullmatch(tag[_MARK])
     try:
-        match = _PATH.fullmatch(tag[_MARK])
         if match is None:
             raise Unusable(f'{_MARK} {shown(tag[_MARK])} has no address, as in ns=1;s=[PLC]N7:0')
         scale: Cells = {}
@@ -111,4 +111,4 @@ def _found(tag: Cells, wanted: Wanted) -> FoundRow | Ignored:
                 tag['documentation'], f'[{tag["engUnit"]}]' * bool(tag['engUnit'])))), **scale),
             match['node'], '' if command else 'readOnly is not in the file: made Read rows')
     except Unusable as error:
-        raise Unusable(str(error), tag['name']) from None
+        raise Unusable(str(error), tag['name'], match and match['node']) from None

@@ -87,7 +87,7 @@ def import_map(path: str, wanted: Wanted) -> Import:
     for record, found in read:
         if isinstance(found, Ignored):
             result.ignored[found.what] += bool(found.what)
-        elif isinstance(found, FoundRow) and wanted.node not in (None, found.node):
+        elif wanted.node is not None and found.node not in (None, wanted.node):
             result.ignored['rows of other PLCs'] += 1
         elif isinstance(found, Unusable):
             _leave_out(result, path, record, found.tag, str(found))

@@ -77,7 +77,7 @@ def _found(record: Cells, section: str, wanted: Wanted) -> FoundRow:
             Description=record.get('comment', ''), **_scaling(record, command)),
             record.get('accessname', ''))
     except Unusable as error:
-        raise Unusable(str(error), tag) from None
+        raise Unusable(str(error), tag, record.get('accessname', '')) from None
 
 
 def _scaling(record: Cells, command: str) -> Cells:
