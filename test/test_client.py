@@ -374,7 +374,7 @@ def test_line_that_comes_back_is_used_again(
 MAP = """\
 Tag,Command,Address,Station,PLC_Type,Length,Scale,Min,Max,Period
 speed,ReadWrite,N7:0,1,SLC,1,0.1,0,50,10
-doors,Read,B3:0/0,1,SLC,3,,,,
+doors,Read,B3:0/0,2,PLC5,3,,,,
 recipe,Write,N7:10,2,PLC5,2,,,,
 name,ReadWrite,ST9:0,1,SLC,,,,,
 far,Read,N7:9,1,SLC,2,0.5,,,60000
@@ -402,10 +402,11 @@ def test_rows_of_a_map_are_read_and_written_by_their_tags(
         assert stored(plcs[1], 'N7:11') == b'\2\0'
         plant.write('name', 'left')
         store(plcs[0], 'N7:9', [6, 8])
-        assert (plant.read('name'), plant.read('doors')) == ('left', [False] * 3)
+        store(plcs[1], 'B3:0', [5])
+        assert (plant.read('name'), plant.read('doors')) == ('left', [True, False, True])
         before = plant.counters.commands_sent
         assert [*plant.read(['name', 'speed', 'doors', 'far']).items()] == [
-            ('name', 'left'), ('speed', pytest.approx(12.3)), ('doors', [False] * 3),
+            ('name', 'left'), ('speed', pytest.approx(12.3)), ('doors', [True, False, True]),
             ('far', [3.0, 4.0])]
         assert plant.counters.commands_sent - before == 3
         for call, text in (
