@@ -42,9 +42,9 @@ from abdf1_ros.ports.descriptor import PortAround
 from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.gateway import SimulatedGateway
 import pytest
-from support.driver_bench import FarEnd, simulated_plc
+from support.driver_bench import simulated_plc
 from support.odd_device import OddDevice, Wiring
-from support.plc_line import Leap, LosesPolls, LOSSY, machine_line, odd_line, plc_line
+from support.plc_line import Leap, LosesPolls, LOSSY, odd_line, plc_line
 from support.ptys import Pty
 
 IDENTITY = Identity(
@@ -193,20 +193,6 @@ def test_node_behind_a_gateway_that_answers_diagnostics_itself_is_proven_by_a_re
     assert found[-1].identity or str(found[-1]) == (
         'answers, but does not identify itself: the gateway answers for this station, as '
         '1785-KE series B revision A')
-
-
-def test_scan_in_full_duplex_does_not_count_what_a_gateway_refuses(tmp_path: Path) -> None:
-    plc = simulated_plc(1, 'SLC', time.monotonic)
-    plc.be_full_duplex()
-    serve = plc.serve
-
-    def gateway(command: Packet) -> Packet:
-        return serve(command) if command.dst == 1 else command.reply(sts=0x02)
-
-    plc.serve = gateway  # type: ignore[method-assign]
-    with machine_line(tmp_path / 'line', FarEnd([plc], Network(mode='Peer'))) as name:
-        found = list(scan(Network(com_port=name, mode='Peer', timeout=2000), [1, 2, 3]))
-    assert [seen.is_there for seen in found] == [True, False, False]
 
 
 def test_scan_asks_silent_stations_again(tmp_path: Path, leap: Leap) -> None:
