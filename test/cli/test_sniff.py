@@ -151,12 +151,12 @@ def test_endless_file_does_not_fill_the_memory(
 def test_progress_has_a_percentage_where_the_size_is_known(
         capsys: Output, capture: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys.stdout, 'isatty', lambda: True)
-    for period, is_terminal, count in ((9.0, True, 0), (0.0, False, 0), (0.0, True, 5)):
+    for period, is_terminal, number in ((9.0, True, 0), (0.0, False, 0), (0.0, True, 5)):
         monkeypatch.setattr(sniff, 'PROGRESS_PERIOD', period)
         monkeypatch.setattr(sys.stderr, 'isatty', lambda: is_terminal)  # noqa: B023
         assert main(['--summary', capture]) == 0
         told = capsys.readouterr().err.splitlines()
-        assert len(told) == count
+        assert len(told) == number
     assert told[-1] == f'sniff: {capture}: 100 %, 45 bytes so far'
     monkeypatch.setattr(sys.stdout, 'isatty', lambda: False)
     output = sniff.Output(sniff.parse([capture]))
