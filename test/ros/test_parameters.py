@@ -475,7 +475,8 @@ def test_sections_of_other_nodes_are_none_of_our_business(
 def test_sections_of_other_lines_of_the_process_are_theirs(
         make_node: Nodes, files: Files, tmp_path: Path) -> None:
     theirs = write_section(tmp_path / 'press.yaml', 'press/abdf1 read_only: true')
-    assert configure(make_node(files), Arguments(theirs.files, others=['/press/abdf1'])).mappings
+    assert configure(make_node(files), Arguments(
+        theirs.files, others=['/press/abdf1', '/parameters'])).mappings
 
 
 def test_parameters_of_the_command_line_of_many_lines(make_node: Nodes, files: Files) -> None:

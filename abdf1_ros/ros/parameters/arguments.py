@@ -100,10 +100,11 @@ class Arguments:
         if any(name == full_name for name, _, _ in sections):
             return
         for name, line, tree in sections:
-            if is_for(name, full_name) or name in self.others:
+            if is_for(name, full_name) or {name, full_name} <= {*self.others}:
                 continue
             found = [parameter for parameter in names_in(tree) if parameter in ours]
-            if found or _base(name) in (_base(full_name), usual_name):
+            if found or (name not in self.others
+                         and _base(name) in (_base(full_name), usual_name)):
                 yield Problem(Place(path, line), _advice(name, full_name, found))
                 return
 
