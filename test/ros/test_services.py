@@ -161,14 +161,6 @@ def test_read_now_of_a_withheld_row_answers_withheld(bench: Bench) -> None:
     assert not values
 
 
-def test_silent_plc_is_answered_with_the_numbered_error(bench: Bench) -> None:
-    bench.plcs.say('silent 1')
-    success, text = bench.read('recipe')
-    assert (success, text[:5]) == (False, '2509 ')
-    success, text = bench.put('horn', True)
-    assert (success, text[:12]) in {(False, 'not written:'), (False, 'unknown whet')}
-
-
 def test_hundred_callers_at_once_have_an_answer_each_and_more_are_refused(bench: Bench) -> None:
     bench.plcs.say('delay 1 300')
     client = bench.ros.node.create_client(
