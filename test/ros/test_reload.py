@@ -502,6 +502,8 @@ def test_only_another_device_is_tried_and_only_by_a_line_that_runs() -> None:
         f'port: /dev/ttyS77 cannot be opened: {reason}', ['/dev/ttyS77'])
     assert refusal(pair, heard('/dev/ttyS77', '/dev/ttyS1')) == ('', ['/dev/ttyS77'])
     assert refusal(pair, heard('/dev/ttyS1', '/dev/ttyS0'), reason=reason) == ('', [])
+    shared = configured(ROW, share='/dev/ttyS77?baud=9600')
+    assert refusal(shared, there, reason=reason) == ('', []), 'a guest has it'
 
 
 def test_other_name_of_the_same_device_is_not_tried(tmp_path: Path) -> None:

@@ -39,7 +39,7 @@ class PortOwners:
 
         Raises ConfigurationError and changes nothing if another line holds one of them.
         """
-        before, wanted = self._devices.get(owner, {}), {_line(name): name for name in names}
+        before, wanted = self._devices.get(owner, {}), {held_line(name): name for name in names}
         # Enter ours first: if two lines want a port at the same time, at most one line gets it.
         self._devices[owner] = wanted
         for other, held in [*self._devices.items()]:
@@ -54,6 +54,7 @@ def _is_place(name: str) -> bool:
     return name.startswith(('pty:', 'tcp:'))
 
 
-def _line(name: str) -> str:
+def held_line(name: str) -> str:
+    """Return the same text for all names of one port or place of Share."""
     where = name.partition('?')[0]
     return share_places(where)[0].line if _is_place(where) else line_of(where)

@@ -18,10 +18,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 
-from abdf1_ros.ports.ownership import line_of
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.trial import why_not
 from abdf1_ros.problems import ConfigurationError, Problem
+from abdf1_ros.ros.bridge.port_owners import held_line
 from abdf1_ros.ros.parameters.declared import Configuration
 from abdf1_ros.settings.columns import MAP_COLUMNS
 from abdf1_ros.settings.network import FIELDS
@@ -40,9 +40,9 @@ def refuse_harm(before: Configuration, after: Configuration, is_open: bool,
     if before.mappings and not after.mappings and not after.network.share:
         problems.append(Problem(after.parameters.map_file, (
             'it has no row, so all topics would end; only a line with Share may have no row')))
-    held = {line_of(name) for name in before.held}
+    held = {held_line(name) for name in before.held}
     for port in settings.each if is_open else ():
-        if line_of(port.name) not in held and (reason := judge(port)):
+        if held_line(port.name) not in held and (reason := judge(port)):
             problems.append(Problem('port', f'{port.name} cannot be opened: {reason}'))
     if problems:
         raise ConfigurationError(problems)
