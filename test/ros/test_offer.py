@@ -33,6 +33,9 @@ from support.cases import for_all
 from support.mappings import make_mapping
 
 
+POINT: Any = SimpleNamespace(stale_time=1.0, error=None, withheld='')
+
+
 class LostPublisher:
     """A publisher that another thread has closed."""
 
@@ -79,7 +82,7 @@ def test_message_that_meets_the_loss_of_the_line_is_no_error(offered: LosingPubl
     assert not offered.is_losing
     node: Any = StandInNode()
     topics, row = ReadTopics(node, {}), make_mapping('N7:0')
-    topics.open({row: SimpleNamespace(stale_time=1.0)})  # type: ignore[dict-item]
+    topics.open({row: POINT})
     for _ in range(6):
         topics.read(row, array('h', [7]))
     topics.publish_later_values()
@@ -136,14 +139,14 @@ def test_value_that_is_read_while_its_topic_begins_stays_the_last() -> None:
     node: Any = SimpleNamespace(create_publisher=lambda *_, **__: SimpleNamespace(publish=publish))
     topics = ReadTopics(node, {})
     topics.read(row, array('h', [7]))
-    topics.offer({row: SimpleNamespace(stale_time=1.0)})  # type: ignore[dict-item]
+    topics.offer({row: POINT})
     assert sent[0] == sent[-1] != sent[1]
 
 
 def test_values_of_a_line_that_was_lost_do_not_come_when_it_is_back() -> None:
     node: Any = Recorder()
     points: dict[Mapping, Any] = {make_mapping(f'N7:{number}', tag=f'n{number}'): SimpleNamespace(
-        stale_time=1.0) for number in range(6)}
+        **vars(POINT)) for number in range(6)}
     tags, row = [row.tag for row in points], next(iter(points))
     published: dict[str, ReadTopic] = {}
     topics = ReadTopics(node, published)
@@ -162,6 +165,9 @@ def test_values_of_a_line_that_was_lost_do_not_come_when_it_is_back() -> None:
     assert node.noted(topics.withdraw) == [f'-{tag}' for tag in tags]
     assert node.noted(topics.publish_later_values) == []
     assert node.noted(topics.read, row, array('h', [7])) == []
+    for number, each in enumerate([*points][1:3]):  # its PLC is in PROGRAM by now, or is silent
+        topics.read(each, array('h', [7]))
+        vars(points[each]).update([('withheld', 'PROGRAM'), ('error', 'no reply')][number:][:1])
     assert node.noted(topics.offer, points) == ['+n0', 'n0', *(f'+{tag}' for tag in tags[1:])]
     after = ReadTopics(node, published)
     after.open({row: points[row]})
@@ -177,7 +183,7 @@ def test_values_of_a_line_that_was_lost_do_not_come_when_it_is_back() -> None:
     ({'kind': 'uint16'}, ['+a'])])
 def test_row_with_other_values_has_a_publisher_that_kept_none(
         changed: dict[str, Any], notes: list[str]) -> None:
-    node, point = Recorder(), SimpleNamespace(stale_time=1.0)
+    node, point = Recorder(), POINT
     published: dict[str, ReadTopic] = {}
     old, new = (make_mapping('N7:0', tag='a', **{'scaling': Scaling(1.8), **more})
                 for more in ({}, changed))

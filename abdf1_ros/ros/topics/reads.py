@@ -136,8 +136,9 @@ class ReadTopics:
             topic = self._topics[mapping.topic] = self._topic(mapping, point, None)
             published = None
             # Again if the link has published newer values meanwhile: the last ones are latched.
+            # Not if a later read has failed or was withheld, as when the PLC went to PROGRAM.
             while (latest := self.latest.get(mapping.topic)) is not None \
-                    and latest is not published:
+                    and latest is not published and not (point.error or point.withheld):
                 published = latest
                 topic.publisher.publish(topic.encode(latest))
         self._to_come.clear()
