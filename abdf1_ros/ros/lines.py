@@ -41,7 +41,7 @@ from abdf1_ros.ros.diagnostics.log import bug_text, LimitedLog
 from abdf1_ros.ros.diagnostics.status import ERROR, message_of, OK, WARN, WORDS
 from abdf1_ros.ros.parameters.arguments import Arguments
 from abdf1_ros.ros.parameters.declared import take_given, wrong_names
-from abdf1_ros.ros.parameters.files import names_in, node_sections, parameter_files, parameter_tree
+from abdf1_ros.ros.parameters.files import node_sections, parameter_files, parameter_tree
 from abdf1_ros.ros.process.main import EXIT_CONFIGURATION, make_parser, Program, REFUSALS, run_ros
 from abdf1_ros.ros.process.runner import Line, LinkFailed, Runner
 from abdf1_ros.signals import EndRequest
@@ -294,10 +294,8 @@ def sections(files: Sequence[str], own_name: str = NODE_NAME) -> dict[str, list[
     found: dict[str, list[Place]] = {}
     problems = []
     for path in dict.fromkeys(files):
-        for name, line, parameters in node_sections(parameter_tree(path)):
-            is_own = name in (f'/{NODE_NAME}', f'/{own_name}') or (
-                _short(name) in (NODE_NAME, own_name) and {*names_in(parameters)} <= {*OPTIONS})
-            if is_own or '*' in name:
+        for name, line, _ in node_sections(parameter_tree(path)):
+            if name in (f'/{NODE_NAME}', f'/{own_name}') or '*' in name:
                 continue
             places = found.setdefault(name, [])
             if places and places[-1].file == path:
