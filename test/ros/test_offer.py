@@ -32,7 +32,6 @@ from std_msgs.msg import UInt8
 from support.cases import for_all
 from support.mappings import make_mapping
 
-
 POINT: Any = SimpleNamespace(stale_time=1.0, error=None, withheld='')
 
 
