@@ -16,6 +16,7 @@
 
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -236,8 +237,8 @@ def test_line_of_a_device_server_is_ours_when_any_station_has_answered_since_it_
 
 def test_change_that_waits_for_the_executor_is_not_begun_again_before_it_ends() -> None:
     tasks: list[Any] = []
-    around: Any = SimpleNamespace(
-        results=None, active_stations=None, snapshot=None, is_offered=True,
+    around: Any = Mock(
+        is_offered=True,
         node=Mock(**{'executor.create_task': lambda *task: tasks.append(task)}))
     session: Any = Mock(has_line=False, **{'withdraw.side_effect': KeyError})
     standby = Standby(around, lambda: session, [])
@@ -251,8 +252,13 @@ def test_change_that_waits_for_the_executor_is_not_begun_again_before_it_ends() 
     with pytest.raises(KeyError):
         change()
     session.has_line = True
-    standby.look()
-    assert len(tasks) == 3
+    session.withdraw.side_effect, session.offer.side_effect = None, (KeyError, None)
+    for is_offered in False, False, False, True:
+        standby.look()
+        with suppress(KeyError):
+            tasks[-1][0]()
+        assert around.is_offered is is_offered
+    assert session.withdraw.call_count == 3  # all that was made is closed before the next try
 
 
 def test_spare_in_the_queue_of_a_device_server_waits_and_keeps_its_line_over_a_reload(

@@ -49,7 +49,7 @@ class Standby:
         self._publishers = (
             surroundings.results, surroundings.active_stations, surroundings.snapshot)
         self._made: dict[Service, Offered] = {}
-        self._is_changing = False
+        self._is_changing = self._is_half = False
 
     def offer(self) -> None:
         """Make all topics and services except the map's."""
@@ -74,6 +74,8 @@ class Standby:
 
     def _step(self) -> Callable[[], None] | None:
         """Return the change that is due."""
+        if self._is_half:
+            return self.leave_line
         has_line, is_offered = self._session().has_line, self._surroundings.is_offered
         if has_line is not is_offered:
             return self._take_line if has_line else self.leave_line
@@ -82,27 +84,32 @@ class Standby:
 
     def _change(self) -> None:
         """
-        Make the change that is due now; if it fails, the next look goes on from there.
+        Make the change that is due now; if it fails, the next look closes all that was made.
 
         The executor may come to it late, as during a reload, when a new connection was heard.
         """
         try:
             if (step := self._step()) is not None:
                 step()
+                self._is_half = False
+        except Exception:
+            self._is_half, self._surroundings.is_offered = True, False
+            raise
         finally:
             self._is_changing = False
 
     def _take_line(self) -> None:
         """Offer everything: the bridge has the line."""
-        self._surroundings.node.get_logger().info(
-            'has got the line: begins to publish and to accept writes')
         self.offer()
         self._session().offer()
+        self._surroundings.node.get_logger().info(
+            'has got the line: begins to publish and to accept writes')
 
     def leave_line(self) -> None:
         """Withdraw all but the services that ``stays`` keeps: another bridge may have the line."""
-        node = self._surroundings.node
-        node.get_logger().warning('has lost the line: waits, and offers no topics and services')
+        if not self._is_half:
+            self._surroundings.node.get_logger().warning(
+                'has lost the line: waits, and offers no topics and services')
         self._surroundings.is_offered = False
         self._session().withdraw()
         for publisher in self._publishers:

@@ -98,9 +98,12 @@ class ReadTopics:
 
     def withdraw(self) -> None:
         """Close all publishers; the link may publish a value meanwhile, which is lost."""
+        topics = dict(self._topics)
         self._topics.clear()
+        self._to_come.clear()
         self._later.clear()
         self.latest.clear()
+        self._close(topics, but=self._published)  # of an offer that has failed
         self._close(self._published, but={})
         self._published.clear()
 
