@@ -391,6 +391,10 @@ def _tell_files(logger: RcutilsLogger, configuration: Configuration) -> None:
             f'read_only: no heartbeat and no fallback value is written: {first(silent)}')
     if not configuration.mappings:
         logger.warning('the map has no usable row: nothing is read or written')
+    if configuration.parameters.standby and '://' in configuration.port \
+            and not configuration.mappings.stations:
+        logger.warning('standby: no row is of a PLC, so an open connection counts as the line; '
+                       'the device server must refuse a second client')
     if configuration.idle:
         logger.warning(f'{first(configuration.idle)} without effect: only for Mode Master with '
                        'Polling Standard')
