@@ -115,7 +115,7 @@ class PtyEndpoint:
         """Drop the bytes that no program has read."""
         theirs = os.open(self._target, os.O_RDWR | os.O_NOCTTY)
         fcntl.ioctl(theirs, termios.TIOCNXCL)  # we may be root, other programs may not
-        termios.tcflush(theirs, termios.TCIFLUSH)
+        _drop_received(theirs)
         os.close(theirs)
 
     def close(self) -> None:
@@ -173,7 +173,7 @@ class PtyPlace(_ShowingPty):
 
     def _forget(self) -> None:
         """Drop the bytes of both directions."""
-        termios.tcflush(self._ours, termios.TCIFLUSH)
+        _drop_received(self._ours)
         self.drop_unread()
 
 
@@ -232,6 +232,10 @@ class _WirePort(DescriptorPort):
         with suppress(BlockingIOError):
             if not self._wire.is_idle:
                 os.write(self._descriptor, data)
+
+
+def _drop_received(terminal: int) -> None:
+    fcntl.ioctl(terminal, termios.TCFLSH, termios.TCIFLUSH)  # tcflush raises termios.error
 
 
 def _close(ends: Iterable[int]) -> None:

@@ -274,7 +274,10 @@ class LinkThread(threading.Thread):
     def _opened_port(self) -> Port | None:
         """Return the port, or None if it is no longer needed; raises OSError."""
         attempt = Attempt(self._open_port, self.wake)
-        attempt.start()
+        try:
+            attempt.start()
+        except RuntimeError as error:  # the system has no thread to give
+            raise OSError(str(error)) from None
         while not attempt.is_over and not self._is_interrupted:
             self._exchange()
             self._wait()

@@ -146,12 +146,15 @@ def mark_damage(descriptor: int) -> None:
     """
     Let the system check parity, and mark characters whose parity or stop bit is wrong.
 
-    pyserial lets the system send parity, but not check it.
+    pyserial lets the system send parity, but not check it. Raises OSError.
     """
-    attributes = termios.tcgetattr(descriptor)
-    attributes[0] |= termios.INPCK | termios.PARMRK
-    attributes[0] &= ~(termios.IGNPAR | termios.ISTRIP | termios.BRKINT)
-    termios.tcsetattr(descriptor, termios.TCSANOW, attributes)
+    try:
+        attributes = termios.tcgetattr(descriptor)
+        attributes[0] |= termios.INPCK | termios.PARMRK
+        attributes[0] &= ~(termios.IGNPAR | termios.ISTRIP | termios.BRKINT)
+        termios.tcsetattr(descriptor, termios.TCSANOW, attributes)
+    except termios.error as error:  # the device has just gone
+        raise OSError(*error.args) from None
 
 
 class SerialDevice(DescriptorPort):

@@ -110,16 +110,20 @@ def test_port_that_vanishes_is_opened_again_when_it_is_back(pty: Pty, link: Link
         back.close()
 
 
-def test_attempts_to_open_do_not_end_and_are_half_a_second_apart() -> None:
-    def refuse() -> Port:
-        raise OSError(16, 'Device or resource busy')
+@pytest.mark.parametrize('what', [OSError(16, 'no'), RuntimeError('no')])  # no more threads
+def test_attempts_to_open_do_not_end_and_are_half_a_second_apart(
+        what: Exception, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*attempt: object) -> Port:
+        raise what
 
+    if isinstance(what, RuntimeError):
+        monkeypatch.setattr(Attempt, 'start', refuse)
     states: list[PortState] = []
     thread = Impatient(Script().machine, refuse, 4, on_state=states.append)
     thread.run_out()
     assert thread.pauses == [0.5, 0.5, 0.5, 0.5]
-    assert {(state, state.kind) for state in states} == {(PortState(
-        False, 'cannot open the port: Device or resource busy'), PortKind.UNAVAILABLE)}
+    assert {(state, state.kind) for state in states} == {
+        (PortState(False, 'cannot open the port: no'), PortKind.UNAVAILABLE)}
 
 
 def test_descriptors_have_no_limit_of_their_own(pty: Pty, link: Link) -> None:

@@ -32,7 +32,7 @@ from abdf1_ros.line_names import number_of
 from abdf1_ros.ports import listing, serial_device
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.ownership import own
-from abdf1_ros.ports.serial_device import hold_device, SerialDevice
+from abdf1_ros.ports.serial_device import hold_device, mark_damage, SerialDevice
 from abdf1_ros.ports.settings import PortSettings
 import pytest
 import serial
@@ -166,6 +166,8 @@ def test_system_doubles_what_looks_like_a_mark(pty: Pty, wake: int) -> None:
     assert data == b'\x01\xff\x02'
     assert termios.tcgetattr(theirs)[0] == termios.INPCK | termios.PARMRK
     port.close()
+    with pytest.raises(OSError, match='Bad file descriptor'):  # an adapter may go at any moment
+        mark_damage(theirs)
 
 
 # Counts of the UART, and the end
