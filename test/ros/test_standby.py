@@ -283,8 +283,12 @@ def test_spare_in_the_queue_of_a_device_server_waits_and_keeps_its_line_over_a_r
             assert ros.call(Trigger, '/abdf1/reload', Trigger.Request()).success
             assert spare.session.has_line  # its port is still open
             assert ros.node.count_publishers('/abdf1/read/speed') == 1
+            write_csv(tmp_path / 'map.csv', 'Tag,Command,Address,Station,PLC_Type',
+                      ['speed,Serve,N7:0,5,PLC5'])
+            assert ros.call(Trigger, '/abdf1/reload', Trigger.Request()).success
         finally:
             ros.end(spare)
             server.close()
     said = capfd.readouterr().err
     assert 'before the PLC has confirmed' not in said and 'has lost the line' not in said
+    assert said.count('standby: no row is of a PLC, so an open connection counts as the line') == 1
