@@ -119,13 +119,13 @@ class Told:
 
     last_step, is_told = 7, False
 
-    def __init__(self, end: BaseException | None) -> None:
-        self._end = end
+    def __init__(self, end: BaseException | None, *, is_told: bool = False) -> None:
+        self._end, self._is_told = end, is_told or end is None
         self.step = 7 if isinstance(end, KeyboardInterrupt) else 3  # also in the last step
 
     def run(self, seconds: float) -> None:
         """End as told."""
-        self.is_told = self._end is None
+        self.is_told = self._is_told
         if self._end:
             raise self._end
 
@@ -134,17 +134,18 @@ class Told:
         print('node: INFO end')
 
 
-@for_all(('end', 'status', 'text'), [
-    (None, 0, 'demo: all 7 steps were seen as they should be'),
-    (KeyboardInterrupt(), 0, 'demo: interrupted in step 7 of 7'),
-    (demo.Missed('waited 30 s for values, which did not come'), 1,
-     'demo: step 3 of 7 was not seen as it should be: waited 30 s for values, which did '
-     'not come')])
+@for_all(('end', 'is_told', 'status', 'text'), [
+    *((end, True, 0, 'demo: all 7 steps were seen as they should be')
+      for end in (None, KeyboardInterrupt())),
+    (KeyboardInterrupt(), False, 0, 'demo: interrupted in step 7 of 7'),
+    *((demo.Missed('waited 30 s for values, which did not come'), is_told, 1,
+       'demo: step 3 of 7 was not seen as it should be: waited 30 s for values, which did '
+       'not come') for is_told in (True, False))])  # also while it runs on after the story
 def test_the_last_line_says_what_was_not_seen(
         monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
-        end: BaseException | None, status: int, text: str) -> None:
+        end: BaseException | None, is_told: bool, status: int, text: str) -> None:
     monkeypatch.setattr(demo, 'ignore_further', lambda: None)
-    told: Any = Told(end)
+    told: Any = Told(end, is_told=is_told)
     assert demo.tell_steps(told, 0.0) == status
     assert capsys.readouterr().out.splitlines()[-1] == text
 
