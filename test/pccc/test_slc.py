@@ -275,4 +275,5 @@ def test_slc_takes_typed_commands_on_files_that_a_plc5_has_too() -> None:
     assert words_at(words, 'N7:1') == '07 00'
     for data, ext_sts in (('06 0A 00', '06'), ('06 01 01', '06'), ('06 63 00', '06'),
                           ('06 07 02', '07'), ('06 0C 00', '06')):
-        assert ask(words, f'68 00 00 01 00 {data} 01 00') == (0xF0, ext_sts)
+        for command in f'68 00 00 01 00 {data} 01 00', f'67 00 00 01 00 {data} 93 09 42 07 00':
+            assert ask(words, command) == (0xF0, ext_sts), command

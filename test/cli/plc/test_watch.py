@@ -303,7 +303,9 @@ def test_number_has_a_curve_where_it_fits_and_can_be_shown(draw: Draw) -> None:
     news = [(SPEED, array('h', [value])) for value in (9, *range(1, 25), 12)]
     silence = (SPEED, NoValue('silent'))
     news = [*news[:-1], silence, (SPEED, NoValue('lost')), news[-1]]
-    head, line = draw([SPEED], *news, size=(75, 9))
+    other = make_mapping('N7:99')
+    head, line, _ = draw([SPEED, other], *news[:-1], (other, array('h', [99])), news[-1],
+                         size=(75, 9))
     assert head.endswith('value, and its last 24 reads')
     assert line.endswith('*  12        3 ▁▁▂▂▂▃▃▃▄▄▄▅▅▅▆▆▆▇▇▇██ ▄ 24')
     for other in ({'size': (74, 9)}, {'encoding': 'latin-1'}):
