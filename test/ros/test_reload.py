@@ -97,7 +97,7 @@ def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
         yield bench
 
 
-def test_rows_come_and_go_and_those_that_stay_are_not_disturbed(bench: Bench) -> None:
+def test_rows_come_and_go_and_others_are_not_disturbed(bench: Bench, capfd: Output) -> None:
     speeds = bench.ros.listen(Int16MultiArray, '/abdf1/read/speed', EVERYTHING)
     speeds.values([7, 8])
     publisher, = (each for each in bench.node.publishers if each.topic_name == speeds.topic)
@@ -118,6 +118,8 @@ def test_rows_come_and_go_and_those_that_stay_are_not_disturbed(bench: Bench) ->
     node = bench.ros.node
     bench.ros.until(lambda: node.count_subscribers('/abdf1/write/level'), 'a topic')
     bench.ros.until(lambda: not node.count_subscribers('/abdf1/write/recipe'), 'its end')
+    assert values_in(bench.ros.listen(Float32MultiArray, '/abdf1/read/level').first()) == [1.5]
+    assert f'/.{bench.plcs.port}: open' in capfd.readouterr().err  # the new session is told
     bench.write_map(LEVEL)
     assert bench.reload()[0]
     bench.ros.until(lambda: not node.count_publishers('/abdf1/read/speed'), 'the end of a topic')

@@ -62,12 +62,9 @@ def test_bars_in_cells_do_not_end_them() -> None:
     assert tables.table(('a',), [('b | c',)]) == '| a |\n| --- |\n| b \\| c |'
 
 
-def test_parts_that_are_only_read_stand_in_parentheses() -> None:
+def test_members_tell_what_is_only_read_and_packets_their_limits() -> None:
     timer = next(row for row in rows(tables.members()) if row[:2] == ['PLC-5', 'T'])
     assert timer == ['PLC-5', 'T', '(CON) PRE ACC', 'EN TT DN']
-
-
-def test_packets_tell_limits_and_what_is_lacking() -> None:
     found = {row[0]: row[1:] for row in rows(tables.packets())}
     assert found['SLC, Processor 5/01'] == ['41', '41', 'F ST A D L HSC PTO PWM STI EII']
     assert found['PLC-5'] == ['110', '110', '']
@@ -97,15 +94,12 @@ def test_numbers_2501_to_2561_are_all_documented() -> None:
                    for row in rows) == 1, number
 
 
-def test_part_goes_between_its_markers() -> None:
+def test_part_goes_between_its_markers_and_a_missing_one_is_named() -> None:
     text = 'a\n<!-- generated: x -->\nold\n<!-- end: x -->\nb\n'
     assert reference.filled(text, 'x', 'new') == \
         'a\n<!-- generated: x -->\n\nnew\n\n<!-- end: x -->\nb\n'
     assert reference.filled(reference.filled(text, 'x', 'new'), 'x', 'old') == \
         reference.filled(text, 'x', 'old')
-
-
-def test_missing_marker_is_named() -> None:
     with pytest.raises(LookupError, match='no markers "generated: y"'):
         reference.filled('text', 'y', 'new')
 
