@@ -291,8 +291,9 @@ GOOD = Network(timeout=300)
         'ms']),
     (Network(timeout=0, tx_delay=5000, mode='Slave'), []),
     (Network(mode='Radio', store_forward='1,2', collision_avoidance=True), []),
-    (Network(store_forward='1,5', collision_avoidance=True), [
-        'Store_Forward is for Mode Radio; in Mode Master it has no effect',
+    (Network(store_forward='1,5'), [
+        'Store_Forward is for Mode Radio; in Mode Master it has no effect']),
+    (Network(collision_avoidance=True), [
         'Collision_Avoidance is for Mode Radio; in Mode Master it has no effect']),
     (Network(mode='Peer', polling='Standard'), [
         'Polling is for Mode Master; in Mode Peer it has no effect']),
