@@ -75,8 +75,8 @@ class ReadTopics:
 
     At a reload, call ``open`` before the new driver runs, and ``take_over`` after the old driver
     has stopped. Publishers of the old map (``published``) are used again where they fit.
-    ``line``: its ports, which may lead to other PLCs, and our own Station, on which it depends
-    what words a PLC-5 gives to PLC-2 commands.
+    ``line``: its ports and our own Station. Other ports may lead to other PLCs, and a PLC-5 has
+    other words for each station that sends it PLC-2 commands.
     ``latest``: the last values of this connection, by topic.
     """
 
