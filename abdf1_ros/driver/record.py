@@ -245,10 +245,11 @@ class WriteRecord:
 
     def take_over(self, before: WriteRecord) -> None:
         """Take what may still land on the same words of the record before."""
-        for words in self._words.values():
-            for row, theirs in before._words.items():
-                if row.extent.meets(words.row.extent):
-                    words.may_land((_Writer.BEFORE,), theirs.lands_until)
+        for row, theirs in before._words.items():
+            if (until := theirs.lands_until) > -math.inf:  # of a few rows, if of any
+                for words in self._words.values():
+                    if row.extent.meets(words.row.extent):
+                        words.may_land((_Writer.BEFORE,), until)
 
     def may_begin(self, row: Mapping) -> bool:
         """Tell whether no write of these words is under way: packets of writes must not mix."""
