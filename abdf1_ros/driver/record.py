@@ -128,6 +128,9 @@ class WriteListener:
     def write_expired(self, write: Write) -> None:
         """Take a message that has ended before it had the line."""
 
+    def may_land(self, claim: Claim) -> None:
+        """Take a write of the driver before, which has ended, but may still land."""
+
 
 class WordsListener(Protocol):
     """A listener to the words of all good reads."""
@@ -220,6 +223,7 @@ class WriteRecord:
         self.line = line
         self._settle_time = settle_time
         self._under_way: list[Claim] = []
+        self._late: list[Claim] = []  # have ended, and may land; for equal words the last one
         self._words: dict[Mapping, OwnWords] = {}
         self._listeners: tuple[WriteListener, ...] = ()
         self.readers: tuple[WordsListener, ...] = ()
@@ -244,12 +248,14 @@ class WriteRecord:
             listener.opened(behind, until)
 
     def take_over(self, before: WriteRecord) -> None:
-        """Take what may still land on the same words of the record before."""
-        for row, theirs in before._words.items():
-            if (until := theirs.lands_until) > -math.inf:  # of a few rows, if of any
-                for words in self._words.values():
-                    if row.extent.meets(words.row.extent):
-                        words.may_land((_Writer.BEFORE,), until)
+        """Take the writes of the record before that may still land, also of rows that are gone."""
+        self._late = [claim for claim in before._late if claim.lands_until > before.line.now]
+        for claim in self._late:
+            for row, words in self._words.items():
+                if claim.meets(row.extent):
+                    words.may_land((_Writer.BEFORE,), claim.lands_until)
+            for listener in self._listeners:
+                listener.may_land(claim)
 
     def may_begin(self, row: Mapping) -> bool:
         """Tell whether no write of these words is under way: packets of writes must not mix."""
@@ -282,7 +288,12 @@ class WriteRecord:
         self._under_way.remove(claim)
         landed = 0.0 if outcome in _CHANGED else -math.inf
         may_land |= outcome is Outcome.BROADCAST  # no station answers it
-        claim.end(outcome, self.line.now, self._settle_time if may_land else landed)
+        now = self.line.now
+        claim.end(outcome, now, self._settle_time if may_land else landed)
+        if may_land:
+            self._late = [*(late for late in self._late if late.lands_until > now
+                            and (late.station, late.extents) != (claim.station, claim.extents)),
+                          claim]
         for words in self._concerned(claim):
             words.ended(claim)
         for listener in self._listeners:

@@ -17,6 +17,7 @@
 from collections import Counter
 import math
 from random import Random
+from unittest.mock import Mock
 
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.settings import LinkSettings
@@ -25,7 +26,7 @@ from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackRow, FallbackState
 from abdf1_ros.driver.interlocks.heartbeat import HeartbeatRow
 from abdf1_ros.driver.interlocks.plc import Conditions, Plc
-from abdf1_ros.driver.record import Claim, WriteRecord
+from abdf1_ros.driver.record import Claim, WriteListener, WriteRecord
 from abdf1_ros.driver.write import Outcome, Write
 from abdf1_ros.driver.writes.queue import WriteQueue
 from abdf1_ros.pccc.address import Address
@@ -99,8 +100,25 @@ def test_rule_10_write_that_may_land_after_the_begin_of_a_fallback_has_it_writte
     assert one.row.words.again_at == again
     assert one.row.is_confirmed is (again == math.inf)
     assert one.row.judge(begun + 1.0, -math.inf) is (again < math.inf)
-    (new := OneRow()).record.take_over(one.record)  # new files change nothing in the PLC
-    assert new.row.words.lands_until == (2.0 if again < math.inf else -math.inf)
+
+
+@for_all(('is_guests', 'now', 'until'), [
+    (False, 1.9, 2.0), (True, 1.9, 2.0), (True, 2.0, -math.inf)])
+def test_rule_10_write_may_land_after_reloads_of_files_that_had_no_fallback_for_its_words(
+        is_guests: bool, now: float, until: float) -> None:
+    row, clock = speed_row(None), StillClock()
+    before, between, after = (WriteRecord(clock, 1.0) for _ in range(3))
+    claim = before.begin(1, [row.extent], None if is_guests else Write(row, [3], 0.0))
+    clock.now = 1.0
+    before.ended(claim, Outcome.UNKNOWN, may_land=True)
+    before.ended(before.begin(1, [row.extent]), Outcome.WRITTEN)
+    words, told, clock.now = after.words_of(speed_row()), WriteListener(), now
+    told.may_land = Mock()  # type: ignore[method-assign]
+    after.connect((told,), ())
+    between.take_over(before)
+    after.take_over(between)
+    assert words.lands_until == until
+    assert told.may_land.call_count == (until > now)
 
 
 @pytest.mark.parametrize(('processor', 'again'), [('ML1000', 1.0), ('5/03', math.inf)])

@@ -233,6 +233,11 @@ def test_unconfirmed_write_may_land_over_the_confirmed_one_that_follows() -> Non
     for station, is_kept in ((2, True), (1, False)):
         standing.forget(station)
         assert bool(standing.proof(last, 8.4)) is is_kept
+    before = Claim(1, [WORD.extent])  # the driver before ~/reload
+    before.end(Outcome.UNKNOWN, 9.0, 1.0)
+    standing.may_land(before)
+    for begun, is_settled in ((9.9, False), (10.0, True)):
+        assert bool(standing.proof(end(9, begun, WRITTEN, 0.0), begun + 0.2)) is is_settled
 
 
 def test_write_that_has_ended_may_have_changed_words_unless_it_cannot_land() -> None:

@@ -83,6 +83,12 @@ class Standing(WriteListener):
         elif claim.begun >= self._settled.get(row, -math.inf):
             self._values[row] = _Value(write, now, now)
 
+    def may_land(self, claim: Claim) -> None:
+        """Record no value of the words before a write of the driver before has landed."""
+        for row in self._patience:
+            if claim.meets(row.extent):
+                self._unsettle(row, claim)
+
     def _unsettle(self, row: Mapping, claim: Claim) -> None:
         """Forget the value of a row; record no new one before the write has landed for certain."""
         self._values.pop(row, None)
