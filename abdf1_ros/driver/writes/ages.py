@@ -35,7 +35,7 @@ _SHARE = 4
 
 # A clock that was ahead is remembered for at least this many seconds, and for at most twice as
 # many.
-_REMEMBERED = 5.0
+REMEMBERED = 5.0
 
 # Longest time (s) between two looks of a running process. For _DRAINED seconds after a longer
 # pause, messages that come may have waited during the whole pause.
@@ -110,14 +110,16 @@ class Ages:
     The ages of the messages of one topic, which have to be younger than ``patience`` (s).
 
     Stamps may be ahead by ``allowed`` s; None where no fallback or heartbeat depends on them.
-    ``lead`` is by how much stamps were ahead lately (s).
+    ``lead`` is by how much stamps were ahead lately (s). ``leads`` remembers it for ``REMEMBERED``
+    s, also over a reload, which changes no clock of a publisher.
     """
 
-    def __init__(self, patience: float, host_clock: HostClock, allowed: float | None) -> None:
+    def __init__(self, patience: float, host_clock: HostClock, allowed: float | None,
+                 leads: RecentMax | None = None) -> None:
         self._patience = patience
         self._host_clock = host_clock
         self._allowed = allowed
-        self._leads = RecentMax(_REMEMBERED)
+        self._leads = leads or RecentMax(REMEMBERED)
         self.lead = 0.0
 
     @property

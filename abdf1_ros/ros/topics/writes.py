@@ -30,7 +30,7 @@ import time
 from typing import Protocol
 
 from abdf1_ros.driver.driver import Driver, TOO_MANY
-from abdf1_ros.driver.writes.ages import Ages, HostClock, most_ahead
+from abdf1_ros.driver.writes.ages import Ages, HostClock, most_ahead, RecentMax, REMEMBERED
 from abdf1_ros.driver.writes.queue import MAX_WAITING_WRITES
 from abdf1_ros.errors import FormatError
 from abdf1_ros.ports.clock import line_time
@@ -178,6 +178,7 @@ class WriteTopics:
         # Stamp and number of the latest messages of each topic; a busy topic drives out no other.
         self.latest: defaultdict[str, dict[tuple[int, int], None]] = defaultdict(dict)
         self.host_clock = HostClock(0.0)  # open knows better
+        self._leads = defaultdict[str, RecentMax](partial(RecentMax, REMEMBERED))  # of topics
         self.taken = 0
 
     def begin(self) -> None:
@@ -215,7 +216,8 @@ class WriteTopics:
                 self._subscriptions[topic] = kind, self._subscription(topic, kind)
         return {topic: WriteTopic(
             topic, mappings, driver,
-            Ages(patience, self.host_clock, most_ahead(topic, driver.mappings)),
+            Ages(patience, self.host_clock, most_ahead(topic, driver.mappings),
+                 self._leads[topic]),
             listener=listener, publishers=partial(self._publishers, topic), wake=wake,
             losses=LossCounter(partial(count_publishers, self._node, topic)))
             for topic, mappings in wanted.items()}
