@@ -52,7 +52,8 @@ class _Writer(Enum):
     NEIGHBOUR = auto()  # a row with other bits of a word that is written back as a whole
     GUEST = auto()
     GUEST_SOMEWHERE = auto()  # by a command whose effect is not known
-    BEFORE = auto()  # any program that had the line before the port was opened
+    BEFORE = auto()  # the driver before ~/reload
+    ANYBODY = auto()  # any program before the port was opened; counts only behind a gateway
 
 
 # The writer, and the values if they are ours.
@@ -207,8 +208,9 @@ class OwnWords:
         """Return until when another value than the confirmed one may land (clock value in s)."""
         if not self._record.may_begin(self.row):
             return math.inf
+        left_out = self._stands, () if self._record.has_gateway(self.row) else (_Writer.ANYBODY,)
         return max((until for source, until in self._lands_until.items()
-                    if source != self._stands), default=-math.inf)
+                    if source not in left_out), default=-math.inf)
 
 
 class WriteRecord:
@@ -222,6 +224,7 @@ class WriteRecord:
     def __init__(self, line: LineTime, settle_time: float) -> None:
         self.line = line
         self._settle_time = settle_time
+        self._stations = ActiveStationList()
         self._under_way: list[Claim] = []
         self._late: list[Claim] = []  # have ended, and may land; for equal words the last one
         self._words: dict[Mapping, OwnWords] = {}
@@ -240,10 +243,9 @@ class WriteRecord:
     def opened(self, stations: ActiveStationList) -> None:
         """Record that gateways may hold earlier writes: the port has been opened."""
         behind = {station.number for station in stations if station.has_gateway}
-        until = self.line.now + self._settle_time
-        for words in self._words.values():
-            if words.row.extent.station in behind:
-                words.may_land((_Writer.BEFORE,), until)
+        until, self._stations = self.line.now + self._settle_time, stations
+        for words in self._words.values():  # a gateway may show itself later
+            words.may_land((_Writer.ANYBODY,), until)
         for listener in self._listeners:
             listener.opened(behind, until)
 
@@ -256,6 +258,11 @@ class WriteRecord:
                     words.may_land((_Writer.BEFORE,), claim.lands_until)
             for listener in self._listeners:
                 listener.may_land(claim)
+
+    def has_gateway(self, row: Mapping) -> bool:
+        """Tell whether the PLC of a row is known to be behind a gateway."""
+        station = row.extent.station
+        return station in self._stations and self._stations[station].has_gateway
 
     def may_begin(self, row: Mapping) -> bool:
         """Tell whether no write of these words is under way: packets of writes must not mix."""

@@ -16,6 +16,7 @@
 
 from collections.abc import Callable
 from functools import partial
+from itertools import count
 import math
 
 from abdf1_ros.df1.packet import Packet
@@ -23,6 +24,7 @@ from abdf1_ros.driver.guests import Guest, GuestCommand, ShareAccess
 from abdf1_ros.driver.interlocks.fallback import FallbackState
 from abdf1_ros.driver.record import Claim
 from abdf1_ros.driver.write import Outcome
+from abdf1_ros.settings.heartbeats import Fallback
 from abdf1_ros.settings.network import POLLING_MODES
 import pytest
 from support.driver_bench import store
@@ -82,6 +84,19 @@ def test_rule_5_what_may_still_land_after_the_end_is_named() -> None:
     what, _, left = unconfirmed.partition(' for ')
     assert what == 'speed (a gateway may hold a write to it'
     assert 0.0 < float(left.removesuffix(' s)')) <= 20.0
+
+
+@pytest.mark.parametrize('is_gateway', [True, False])
+def test_rule_10_gateway_that_shows_itself_after_the_port_was_opened_may_hold_an_earlier_command(
+        is_gateway: bool) -> None:
+    cell = Cell(speed_row(Fallback((7,), 60_000)), start=False)
+    tries = count(not is_gateway)
+    cell.is_undelivered = lambda command: command.data.endswith(b'\7\0') and not next(tries)
+    cell.bench.open(run=0.9)  # the second try is confirmed long before
+    assert cell.results() == [START]
+    store(cell.plc, 'N7:0', [800])  # it has let it go
+    cell.run(0.2)
+    assert cell.word('N7:0') == (7 if is_gateway else 800)
 
 
 @pytest.mark.parametrize('dst', [1, 255])
