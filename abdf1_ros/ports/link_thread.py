@@ -251,6 +251,7 @@ class LinkThread(threading.Thread):
                 self._set_state(False, RELEASED)
                 self._is_free.set()
                 self._wait()
+                self.came_after = self._clock()  # no byte comes to a port that is closed
             elif not self._use_port() and not self.has_failed:
                 self._pause(self.retry_period)
         if self.state.is_open:

@@ -29,7 +29,7 @@ from abdf1_ros.df1.machine import LineTiming, Listen, Machine, Procedure, Rest, 
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import CommandExpired
 from abdf1_ros.ports.descriptor import DescriptorPort, READ_SIZE
-from abdf1_ros.ports.link_thread import LinkThread
+from abdf1_ros.ports.link_thread import LinkThread, PortState, RELEASED
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.trace import PortOpener
 import pytest
@@ -316,6 +316,20 @@ def test_bytes_may_have_come_since_an_attempt_to_open_began() -> None:
                        clock=count(100.0).__next__)
     thread.run_out()
     assert thread.came_after == 101.0
+
+
+def test_no_byte_came_while_the_port_was_left_to_another_program() -> None:
+    def told(state: PortState) -> None:
+        if state.text == RELEASED:
+            port.now = 60.0
+            thread.take()
+        came.append(thread.came_after)
+
+    script, port, came = Script(Rest()), Paused(), list[float]()
+    thread = Impatient(script.machine, lambda: port, 1, clock=port.clock, on_state=told)
+    thread.is_released = True
+    thread.run_out()
+    assert came == [0.0, 60.0, 60.0]
 
 
 def test_request_that_comes_together_with_bytes_is_taken_after_them() -> None:
