@@ -262,7 +262,8 @@ class GuestQueue:
         job.has_failed = error is not None
         was_sent = error is None or getattr(error, 'sent', True)
         if error is not None:
-            self._silent(station, self.line.now)
+            if was_sent or not isinstance(error, CommandExpired):  # else it was not even asked
+                self._silent(station, self.line.now)
             self._give_up(command, _status_of(error, was_sent))
         if (claim := job.claim) is not None:
             outcome = outcome_of(station, job.sts, error, was_sent)
