@@ -121,7 +121,7 @@ class Agenda:
         self._reads = reads
         self._guests = guests
         self._share = _GuestShare(stations, guests, tasks)
-        self._held_until = math.inf  # when a waiting guest has its share (clock value in s)
+        self._held_until = math.inf  # when a waiting guest may have the line (clock value in s)
         self._tasks = tasks
         self._own_in_a_row = 0
         self._last_read: int | None = None  # the station of the last read between own writes
@@ -163,7 +163,9 @@ class Agenda:
             return write
         is_limited = self._questions >= _QUICK_QUESTIONS and now < self._next_question
         if is_limited:
-            own = self._interlocks
+            own, guests = self._interlocks, self._guests
+            self._held_until = self._next_question \
+                if guests.inbox.items or guests.waiting else math.inf
             return self._has_own and (
                 self._tasks.continued(now, busy, _is_own)  # with all its packets
                 or own.next(now, busy) or own.refresh(now, busy)) or None

@@ -25,7 +25,7 @@ from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 import pytest
 from support.deaths import MODES
-from support.driver_bench import DriverBench
+from support.driver_bench import DriverBench, Program, READ_N7
 from support.mappings import make_mapping
 from support.odd_device import frame, OddDevice, Wiring
 
@@ -216,3 +216,17 @@ def test_read_of_a_guest_is_the_question_where_there_are_no_rows_no_write(mode: 
     assert bench.values_written() == [5, 5, *[9] * (mode == 'Peer'), 5]  # what was kept
     assert bench.listener.outcomes() == [
         Outcome.UNKNOWN if mode == 'Peer' else Outcome.BROADCAST]
+
+
+@pytest.mark.parametrize('rows', [0, 1])
+def test_guest_is_the_next_question_of_a_silent_line(rows: int) -> None:
+    """One that reads seldom, or never, wakes nobody for it."""
+    bench = DriverBench(
+        [make_mapping('N7:0', plc='SLC', period=60_000)][:rows],
+        network=Network(baud=19200, timeout=100, cmd_timeout=3000, share='tcp:6000'),
+        settings=DriverSettings(may_store=True))
+    program = Program(bench)
+    program.go_on(lambda: program.ask(READ_N7), pause=0.3)
+    for _ in range(100):
+        bench.run(0.2)
+    assert {*program.statuses} == {7}
