@@ -43,6 +43,7 @@ from abdf1_ros.plan.forecast import (
     period_of,
     poll_cycle,
     stale_times,
+    USUAL_RESPONSE_TIME,
 )
 from abdf1_ros.plan.planner import Block, Planner
 from abdf1_ros.plan.refusals import Change, Refusals
@@ -51,8 +52,10 @@ from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.rows import Rows
 
 # Other commands go between the packets of one read. On a busy line the read may take this many
-# times its own time.
+# times its own time. A slow station may reply to each packet within Cmd_Timeout only. Where
+# stations are polled in turn, each packet may take this many scans.
 _TURNS_OF_A_READ = 10
+_SCANS_OF_A_PACKET = 2
 
 
 class ValueListener(Protocol):
@@ -85,6 +88,7 @@ class Readings:
                  record: WriteRecord) -> None:
         self.planner = Planner(line_model(network), settings.default_period)
         blocks = self.planner.plan(mappings.repeated)
+        self._longest_frames = max((max(block.line_times) for block in blocks), default=0.0)
         self.guards = Guards()
         times = settings.default_period, settings.stale_after
         self.mode_periods = mode_periods(mappings, *times)
@@ -108,8 +112,12 @@ class Readings:
         return [job.block for job in self.reads.jobs if not job.is_on_demand]
 
     def _job(self, block: Block) -> ReadJob:
-        longest = self._network.line_mode.longest_transaction(self._network.line, 0.0) \
-            + _TURNS_OF_A_READ * block_time(block)
+        mode, line = self._network.line_mode, self._network.line
+        scan = mode.undisturbed(line, self._longest_frames, USUAL_RESPONSE_TIME,
+                                self._longest_frames, sum(1 for _ in self._stations))
+        packet = max(line.cmd_timeout, _SCANS_OF_A_PACKET * scan)
+        longest = mode.longest_transaction(line, 0.0) + max(
+            _TURNS_OF_A_READ * block_time(block), len(block.requests) * packet)
         points = [self.points[mapping] for mapping in block.mappings if mapping.reads]
         return ReadJob(block, points, self._line, self._packet_ended, longest)
 
