@@ -294,7 +294,8 @@ class StandIn:
     """A node, a driver and a write topic in one, which only remember."""
 
     def __init__(self, *rows: Mapping) -> None:
-        self.network, self.mappings, self.executor = Network(), Rows(rows), self
+        self.network, self.mappings = Network(polling='Standard'), Rows(rows)
+        self.executor = self
         self.call_stamps = 1, 2
         self.made: dict[str, Callable[..., Coroutine[Any, Any, Any]]] = {}
         self.closed: list[str] = []
@@ -346,7 +347,8 @@ def test_services_of_rows_that_are_gone_close_once_when_no_call_waits() -> None:
     assert woken == ['link', [False, False, False, True]]
     assert [*node.messages[1].values()] == [1, 2, None]
     assert ended(puts[2]) == (True, 'l0: stands in the PLC; l1: stands in the PLC')
-    longest = 2.0 + Network().line_mode.longest_transaction(Network().line, 0.0)
+    line = node.network
+    longest = 2.0 + line.line_mode.longest_transaction(line.line, 0.0, stations=1)
     services.look(begun + 2 * longest - 0.001)
     assert len(woken) == 2
     services.look(line_time() + 2 * longest)

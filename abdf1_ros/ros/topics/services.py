@@ -107,7 +107,8 @@ class RowServices:
         network = driver.network
         # A write waits for the line, and may then wait to be read back. A transaction follows each
         # wait.
-        self._longest = 2 * (patience + network.line_mode.longest_transaction(network.line, 0.0))
+        self._longest = 2 * (patience + network.line_mode.longest_transaction(
+            network.line, 0.0, stations=len(driver.mappings.stations)))
         self._rows = {} if network.line_mode.only_listens \
             else dict(_offered(driver.mappings, most))
         self._retire()
