@@ -218,13 +218,9 @@ def test_read_of_a_guest_is_the_question_where_there_are_no_rows_no_write(mode: 
         Outcome.UNKNOWN if mode == 'Peer' else Outcome.BROADCAST]
 
 
-@pytest.mark.parametrize('rows', [0, 1])
-def test_guest_is_the_next_question_of_a_silent_line(rows: int) -> None:
-    """One that reads seldom, or never, wakes nobody for it."""
-    bench = DriverBench(
-        [make_mapping('N7:0', plc='SLC', period=60_000)][:rows],
-        network=Network(baud=19200, timeout=100, cmd_timeout=3000, share='tcp:6000'),
-        settings=DriverSettings(may_store=True))
+def test_guest_is_the_next_question_of_a_silent_line() -> None:
+    bench = DriverBench([], settings=DriverSettings(may_store=True), network=Network(
+        baud=19200, timeout=100, cmd_timeout=3000, share='tcp:6000'))
     program = Program(bench)
     program.go_on(lambda: program.ask(READ_N7), pause=0.3)
     for _ in range(100):

@@ -126,8 +126,9 @@ def test_access_says_what_goes_to_the_line(entry: tuple[ShareAccess, int, bytes,
 
 def test_command_that_has_become_too_old_after_it_was_taken_is_not_sent() -> None:
     bench = bench_of()
+    bench.driver.stations.heard(2, bench.clock())
     program = Program(bench, ShareAccess.WRITE)
-    program.ask(WRITE_N7)
+    program.ask(WRITE_N7, dst=2)
     guests = bench.driver.guests
     later: list[Packet] = []
     guests.put(GuestCommand(
@@ -140,25 +141,11 @@ def test_command_that_has_become_too_old_after_it_was_taken_is_not_sent() -> Non
     program.guest.listener = told = Told()
     job.ended(CommandExpired(sent=False))
     assert (program.statuses, told.words) == ([0x01], [])
+    assert bench.driver.stations[2].active  # it was not even asked
     job = guests.next(bench.clock(), ())
     assert job is not None
     job.ended(PortLost('unplugged', sent=False))
     assert [reply.sts for reply in later] == [0x04]
-
-
-def test_station_of_guests_alone_is_not_silent_by_a_command_that_was_too_old() -> None:
-    bench = bench_of(rows=1)
-    bench.plc(2, 'SLC', ('N7:0', 20))
-    program = Program(bench)
-    program.ask(READ_N7, dst=2)
-    bench.run(1.0)
-    bench.driver.guests.put(GuestCommand(
-        program.guest, Packet(2, 9, 0x0F, 0, 2, READ_N7), bench.clock(), print))
-    job = bench.driver.guests.next(bench.clock(), ())
-    assert job is not None
-    for sent, is_active in (False, True), (True, False):
-        job.ended(CommandExpired(sent=sent))  # True: its first try had no answer
-        assert bench.driver.stations[2].active is is_active
 
 
 def test_what_is_not_allowed_is_refused_at_once_and_changes_nothing() -> None:
