@@ -222,9 +222,11 @@ class LinkThread(threading.Thread):
             not exchange.claim() and self._has_happened(exchange.is_done))
 
     def _has_happened(self, event: threading.Event) -> bool:
-        """Wait up to 5 s until this thread has set an event, but only while the thread runs."""
+        """Wait up to 5 s until this thread has set an event; not if the thread has ended."""
         give_up = time.monotonic() + EXCHANGE_LIMIT
-        while not event.wait(_GLANCE) and self.is_alive() and time.monotonic() < give_up:
+        # The node takes calls a moment before its link starts; ``ident`` is None until then.
+        while not event.wait(_GLANCE) and (self.ident is None or self.is_alive()) \
+                and time.monotonic() < give_up:
             pass
         return event.is_set()
 

@@ -458,9 +458,21 @@ def test_machine_that_came_to_nothing_does_not_come_later(monkeypatch: pytest.Mo
     assert after.ended.empty()
 
 
-@pytest.mark.parametrize('ask', [
-    LinkThread.release,
-    lambda thread: thread.exchange(Script().machine, lambda: None, reopen=False)])
+ASKS = (LinkThread.release,
+        lambda thread: thread.exchange(Script().machine, lambda: None, reopen=False))
+
+
+@pytest.mark.parametrize('ask', ASKS)
+def test_thread_that_begins_later_is_waited_for(
+        ask: Callable[[LinkThread], bool], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr('abdf1_ros.ports.link_thread._GLANCE', 0.001)
+    thread = LinkThread(Script(Rest()).machine, NoLine)
+    threading.Timer(0.02, thread.start).start()
+    assert ask(thread)
+    thread.stop()
+
+
+@pytest.mark.parametrize('ask', ASKS)
 def test_thread_that_has_ended_is_not_waited_for(ask: Callable[[LinkThread], bool]) -> None:
     thread = Impatient(Broken().machine, NoLine, 100)
     thread.start()

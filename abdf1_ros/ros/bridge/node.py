@@ -148,9 +148,10 @@ class BridgeNode(AnsweringNode):
                 parameters.trace_file, parameters.trace_limit * 1e6,
                 _head(self.session.configuration.network),
                 lambda text: self.get_logger().error(f'trace_file: {printable(text)}'))
-        self.link.start()
+        # First, because ~/reload starts guests, too, as soon as the link runs.
         if self.surroundings.is_offered:
             self.session.guests.start()
+        self.link.start()
 
     def begin_end(self) -> None:
         """Begin the end of the bridge and its session; no request can cancel it."""
@@ -208,6 +209,8 @@ class BridgeNode(AnsweringNode):
         if self.hand_over(configuration):
             response.success = True
             response.message = f'{printable(str(configuration))}; {changes(before, configuration)}'
+        elif self._is_ending:  # the end has begun meanwhile
+            response.message = ENDS
         else:
             response.message = 'ends: the link does not accept the new files'
             self.get_logger().fatal(response.message)
@@ -216,7 +219,7 @@ class BridgeNode(AnsweringNode):
 
     def hand_over(self, configuration: Configuration) -> bool:
         """
-        Hand the line over to new files; return False if the link does not accept them.
+        Hand the line over to new files; return False if the link does not accept them, or ends.
 
         If the new session cannot be made, the old one goes on, after the port was opened again.
 
@@ -229,6 +232,8 @@ class BridgeNode(AnsweringNode):
         """
         tell_plcs([self.session], 'goes on with new files', HAND_OVER)
         before = self.session
+        if self._is_ending:  # the end has begun meanwhile
+            return False
         try:
             session = BridgeSession(self.surroundings, configuration)
         except Exception:
@@ -241,12 +246,13 @@ class BridgeNode(AnsweringNode):
         session.diagnostics.line.attach(self.link, self._opener)
         self.session = session  # from now on, ``check`` judges its statuses
         self.writes.give_to(session.writers)
-        if not self.link.exchange(session.driver.machine, session.reads.publish_later_values,
-                                  self._opener.use(_port_settings(configuration),
-                                                   _head(configuration.network)),
-                                  take_over=partial(session.driver.take_over, before.driver)):
-            return False
+        is_done = self.link.exchange(
+            session.driver.machine, session.reads.publish_later_values,
+            self._opener.use(_port_settings(configuration), _head(configuration.network)),
+            take_over=partial(session.driver.take_over, before.driver))
         before.end()
+        if not is_done:
+            return False
         self.session.begin()
         if self._is_ending:  # the end has begun meanwhile
             self.session.begin_end()
