@@ -334,6 +334,10 @@ def test_link_and_standby_tell_how_often_diagnostics_come(bench: Bench) -> None:
         assert len(bench.diagnostics.levels(NOW, is_waiting=is_waiting)) == count
         status = bench.diagnostics.statuses(NOW, is_waiting=is_waiting)[0]
         assert details(status)['diagnostics period'] == '10 s'
+    bench.seen.take_over_fault = 'no memory'
+    status, = bench.diagnostics.statuses(NOW, is_waiting=True)
+    assert status.message.startswith('ERROR: has got the line on ')
+    assert status.message.endswith(', but cannot offer its topics and services: no memory')
 
 
 def test_fault_is_logged_when_it_begins_and_again_after_it_was_over(bench: Bench) -> None:
@@ -369,6 +373,8 @@ def test_fault_is_logged_when_it_begins_and_again_after_it_was_over(bench: Bench
         'a changed since read; ca', '~/write/b has more than ', 'guest pty:a: in use',
         'refused a command of sta', 'refused a command of sta', 'station 1 is an SLC 5/03']
     assert look(18.0) == bench.seen.changed_files == bench.seen.crowded == [*bench.seen.dds_fault]
+    bench.seen.is_waiting = lambda: True  # it offers no ~/reload
+    assert look(17.0)[0] == 'a changed since read; restart this bridge'
     assert bench.says('station 1', NOW + 17.0) == (
         WARN, 'WARN: station 1 is an SLC 5/03, map.csv:2 says PLC5')
 

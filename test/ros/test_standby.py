@@ -25,9 +25,10 @@ from unittest.mock import MagicMock, Mock
 from abdf1_ros.ports.link_thread import PortState
 from abdf1_ros.ros.bridge.node import BridgeNode
 from abdf1_ros.ros.bridge.session import BridgeSession
-from abdf1_ros.ros.bridge.standby import Standby
+from abdf1_ros.ros.bridge.standby import Service, Standby
 from diagnostic_msgs.msg import DiagnosticStatus
 import pytest
+from rclpy.task import Future
 from std_msgs.msg import Int16MultiArray, UInt16MultiArray
 from std_srvs.srv import SetBool, Trigger
 from support.device_server import QueueingServer
@@ -252,13 +253,39 @@ def test_change_that_waits_for_the_executor_is_not_begun_again_before_it_ends() 
     with pytest.raises(KeyError):
         change()
     session.has_line = True
-    session.withdraw.side_effect, session.offer.side_effect = None, (KeyError, None)
-    for is_offered in False, False, False, True:
+    session.withdraw.side_effect, session.offer.side_effect = None, (KeyError('x'), None)
+    for is_offered, fault in ((False, 'KeyError()'), (False, "KeyError('x')"),
+                              (False, "KeyError('x')"), (True, '')):
         standby.look()
         with suppress(KeyError):
             tasks[-1][0]()
-        assert around.is_offered is is_offered
+        assert (around.is_offered, session.events.seen.take_over_fault) == (is_offered, fault)
     assert session.withdraw.call_count == 3  # all that was made is closed before the next try
+
+
+def test_service_is_closed_after_the_answer_to_its_caller() -> None:
+    node = Mock(**{'executor.create_task.side_effect': lambda task: task()})
+    around: Any = Mock(node=node)
+    session: Any = Mock(has_line=False)
+    waits = Future()
+
+    async def answer(request: str, response: str) -> str:
+        await waits
+        return request + response
+
+    standby = Standby(around, lambda: session, [
+        Service('~/slow', Trigger, answer), Service('~/polling', SetBool, Mock(), stays=True)])
+    standby.offer()
+    call = node.create_service.call_args_list[0].args[2]('a', 'b')
+    call.send(None)
+    for closed in 0, 1, 2, 2:
+        standby.look()
+        assert node.destroy_service.call_count == closed
+        if not closed:
+            waits.set_result(None)
+            with pytest.raises(StopIteration, match='ab'):
+                call.send(None)
+        around.link.is_released = not closed
 
 
 def test_spare_in_the_queue_of_a_device_server_waits_and_keeps_its_line_over_a_reload(

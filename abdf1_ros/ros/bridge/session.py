@@ -119,7 +119,8 @@ class BridgeSession:
             node, surroundings.published,
             (configuration.port, *network.ports[1:], f'as station {network.station}'))
         seen = Seen(lambda: surroundings.names.text, latest=self.reads.latest,
-                    diagnostics_period=parameters.diagnostics_period)
+                    diagnostics_period=parameters.diagnostics_period,
+                    is_waiting=lambda: self.is_waiting)
         self.events = LineEvents(
             node.get_logger(), self.port, stations_of(mappings),
             scans=not network.line_mode.has_one_plc, seen=seen, read=self._reader(),
@@ -297,6 +298,7 @@ class BridgeSession:
 
     def _forget_connection(self) -> None:
         """Drop old values and results: a bridge may get the line again hours later."""
+        self.events.seen.take_over_fault = ''
         self.reads.latest.clear()
         if self.configuration.parameters.standby:
             self.driver.interlocks.forget_served()

@@ -17,10 +17,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import NamedTuple
 
 from abdf1_ros.ros.bridge.session import BridgeSession, Surroundings
 from rclpy.callback_groups import CallbackGroup
+from rclpy.executors import await_or_execute
 from rclpy.service import Service as Offered
 
 
@@ -49,6 +51,7 @@ class Standby:
         self._publishers = (
             surroundings.results, surroundings.active_stations, surroundings.snapshot)
         self._made: dict[Service, Offered] = {}
+        self._calls: list[Service] = []  # the service of each call that has no answer yet
         self._is_changing = self._is_half = False
 
     def offer(self) -> None:
@@ -59,7 +62,15 @@ class Standby:
         for service in self._services:
             if service not in self._made:
                 self._made[service] = self._surroundings.node.create_service(
-                    service.kind, service.name, service.answer, callback_group=service.group)
+                    service.kind, service.name, partial(self._answer, service),
+                    callback_group=service.group)
+
+    async def _answer(self, service: Service, request: object, response: object) -> object:
+        self._calls.append(service)
+        try:
+            return await await_or_execute(service.answer, request, response)
+        finally:
+            self._calls.remove(service)
 
     def look(self) -> None:
         """
@@ -68,7 +79,7 @@ class Standby:
         After a released port is taken back, a bridge without the line closes its last services.
         """
         executor = self._surroundings.node.executor
-        if self._step() is not None and not self._is_changing and executor is not None:
+        if not self._is_changing and self._step() is not None and executor is not None:
             self._is_changing = True
             executor.create_task(self._change)
 
@@ -79,8 +90,7 @@ class Standby:
         has_line, is_offered = self._session().has_line, self._surroundings.is_offered
         if has_line is not is_offered:
             return self._take_line if has_line else self.leave_line
-        has_rest = not is_offered and self._made and not self._surroundings.link.is_released
-        return self._close if has_rest else None
+        return self._close if not is_offered and self._to_close() else None
 
     def _change(self) -> None:
         """
@@ -88,12 +98,16 @@ class Standby:
 
         The executor may come to it late, as during a reload, when a new connection was heard.
         """
+        seen = self._session().events.seen
         try:
             if (step := self._step()) is not None:
                 step()
                 self._is_half = False
-        except Exception:
+            if self._step() is None:  # else the take-over is tried again
+                seen.take_over_fault = ''
+        except Exception as error:
             self._is_half, self._surroundings.is_offered = True, False
+            seen.take_over_fault = repr(error)
             raise
         finally:
             self._is_changing = False
@@ -117,7 +131,12 @@ class Standby:
         self._close()
 
     def _close(self) -> None:
-        """Close the services, except for those that have to take a released port back."""
-        for service in [*self._made]:
-            if not service.stays or not self._surroundings.link.is_released:
-                self._surroundings.node.destroy_service(self._made.pop(service))
+        """Close services; ``look`` closes all others later."""
+        for service in self._to_close():
+            self._surroundings.node.destroy_service(self._made.pop(service))
+
+    def _to_close(self) -> list[Service]:
+        """Return the services without a caller that do not have to take a released port back."""
+        keeps = self._surroundings.link.is_released
+        return [service for service in self._made
+                if service not in self._calls and not (service.stays and keeps)]

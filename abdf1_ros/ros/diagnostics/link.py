@@ -122,7 +122,7 @@ class LinkStatus:
                for text, count in driver.refused.counted().items()},
             **{name: str(count) for name, count in (opener.errors() if opener else {}).items()},
             **period_of(self._seen),
-            'files': changed_text(self._seen.changed_files) or 'as read',
+            'files': changed_text(self._seen) or 'as read',
             'last error': with_age(self._seen.last_error, now),
         }
 
@@ -160,9 +160,12 @@ def _settings(network: Network) -> str:
             f'{network.stop_bits} stop bits, {network.error_code}')
 
 
-def changed_text(names: Sequence[str]) -> str:
+def changed_text(seen: Seen) -> str:
     """Return a text that names changed files, empty if none has changed."""
-    return f'{", ".join(names)} changed since read; call ~/reload to read again' if names else ''
+    # a spare does not offer ~/reload
+    cure = 'restart this bridge' if seen.is_waiting() else 'call ~/reload to read again'
+    return f'{", ".join(names)} changed since read; {cure}' if (names := seen.changed_files) \
+        else ''
 
 
 class _LoadMeter:

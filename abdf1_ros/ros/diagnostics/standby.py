@@ -19,7 +19,8 @@ from __future__ import annotations
 import socket
 
 from abdf1_ros.ros.diagnostics.line import LineView
-from abdf1_ros.ros.diagnostics.status import Judgement, OK, period_of, Seen, WARN
+from abdf1_ros.ros.diagnostics.link import changed_text
+from abdf1_ros.ros.diagnostics.status import ERROR, Judgement, OK, period_of, Seen, WARN
 
 
 class StandbyStatus:
@@ -33,12 +34,15 @@ class StandbyStatus:
         self._seen = seen
 
     def judge(self, now: float) -> Judgement:
-        link = self._line.link
+        link, seen = self._line.link, self._seen
+        if seen.take_over_fault:
+            return ERROR, f'has got the line on {socket.gethostname()}, but cannot offer its ' \
+                f'topics and services: {seen.take_over_fault}'
         state = 'not started yet' if link is None else 'the port is open, and no station has ' \
             'answered' if link.state.is_open else link.state.text
         text = f'waits on {socket.gethostname()} for the line: {state}'
-        if changed := self._seen.changed_files:
-            return WARN, f'{text}; {", ".join(changed)} changed since read; restart this bridge'
+        if changed := changed_text(seen):
+            return WARN, f'{text}; {changed}'
         return OK, text
 
     def values(self, now: float) -> dict[str, str]:

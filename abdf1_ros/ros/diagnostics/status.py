@@ -54,6 +54,10 @@ class Seen:
 
     duplicate_name: Callable[[], str] = str
     """Returns a text if another node has our name, otherwise an empty text."""
+    is_waiting: Callable[[], bool] = bool
+    """Returns True if this is a spare, and another bridge may have the line."""
+    take_over_fault: str = ''
+    """The reason why a spare that has got the line offers nothing."""
     changed_files: Sequence[str] = ()
     """Names of files that have changed since they were read."""
     dds_fault: str = ''

@@ -86,7 +86,7 @@ def watches_of(line: LineView, port: str, seen: Seen, guests: Sequence[GuestLine
     """Return the watches of a session; they put findings for the statuses into ``seen``."""
     def changed(now: float) -> list[str]:
         seen.changed_files = changed_files(now)
-        return [changed_text(seen.changed_files)] if seen.changed_files else []
+        return [changed_text(seen)] if seen.changed_files else []
 
     def crowded(now: float) -> list[str]:
         seen.crowded = crowded_topics(now)
