@@ -282,7 +282,7 @@ class LinkThread(threading.Thread):
         except RuntimeError as error:  # the system has no thread to give
             raise OSError(str(error)) from None
         while not attempt.is_over and not self._is_interrupted:
-            self._exchange()
+            self._exchange(keeps_port=True)
             self._wait()
         if self._is_interrupted:
             attempt.abandon()
@@ -294,11 +294,18 @@ class LinkThread(threading.Thread):
             raise attempt.error
         return attempt.port
 
-    def _exchange(self) -> None:
-        """If another machine has been handed over, put it on the line."""
+    def _exchange(self, keeps_port: bool = False) -> None:
+        """
+        If another machine has been handed over, put it on the line.
+
+        With ``keeps_port``, a machine for another port waits until this port is closed.
+        """
         self.has_turned = True
-        exchange, self._next = self._next, None
-        if exchange is not None and exchange.claim():
+        exchange = self._next
+        if exchange is None or (keeps_port and exchange.reopen):
+            return
+        self._next = None
+        if exchange.claim():
             self._machine.stop(PortLost(exchange.reason))
             self._while_sending()
             exchange.take_over()
@@ -311,7 +318,7 @@ class LinkThread(threading.Thread):
         end = 'the driver is stopping'
         try:
             while not self._is_interrupted:
-                self._exchange()
+                self._exchange(keeps_port=True)
                 self._serve(port)
             if self.is_released:
                 end = RELEASED

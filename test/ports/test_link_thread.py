@@ -76,11 +76,16 @@ def test_wake_ends_a_rest(pty: Pty, link: Link) -> None:
 
 def test_wake_may_come_in_any_number_and_before_the_start(pty: Pty, link: Link) -> None:
     script = Script(Listen(PATIENCE))
-    thread = LinkThread(script.machine, lambda: open_port(PortSettings(str(pty.name))))
+    thread = LinkThread(Script().machine, lambda: open_port(PortSettings(str(pty.name))))
     link.threads.append(thread)
-    for _ in range(100_000):
-        thread.wake()
-    thread.start()
+
+    def begin() -> None:
+        for _ in range(100_000):
+            thread.wake()
+        thread.start()
+
+    threading.Thread(target=begin).start()
+    assert thread.exchange(script.machine, lambda: None, reopen=False)  # before the start, too
     assert pty.read(5) == READY
     pty.write(ACK)
     assert script.next() == Control(Code.ACK)
@@ -412,6 +417,39 @@ def test_other_machine_goes_on_with_the_same_port(pty: Pty, link: Link) -> None:
     assert link.states.empty()  # the port has not been closed
 
 
+def test_machine_for_another_port_never_has_the_one_that_is_open() -> None:
+    happened: list[str] = []
+    woken = threading.Event()
+
+    class Told(NoLine):
+        def __init__(self) -> None:
+            happened.append('opened')
+
+        def close(self) -> None:
+            happened.append('closed')
+
+    class Late(LinkThread):
+        def __setattr__(self, name: str, value: object) -> None:
+            super().__setattr__(name, value)
+            if name == 'has_turned' and happened == ['opened']:  # it has looked, and takes it now
+                happened.append('asked')
+                woken.clear()
+                threading.Thread(target=self.exchange, args=(
+                    Script(Rest()).machine, lambda: None, True, '',
+                    lambda: happened.append('exchanged'))).start()
+                assert woken.wait(PATIENCE)
+
+        def wake(self) -> None:
+            super().wake()
+            woken.set()
+
+    thread = Late(Script(Rest()).machine, Told)
+    thread.start()
+    wait_until(lambda: 'exchanged' in happened)
+    thread.stop()
+    assert happened[:4] == ['opened', 'asked', 'closed', 'exchanged']
+
+
 def test_other_machine_on_a_port_that_is_opened_anew(pty: Pty, link: Link) -> None:
     before, after = Script(Listen(None)), Script(Listen(None))
     thread = link.start(before.machine, pty.name)
@@ -458,21 +496,9 @@ def test_machine_that_came_to_nothing_does_not_come_later(monkeypatch: pytest.Mo
     assert after.ended.empty()
 
 
-ASKS = (LinkThread.release,
-        lambda thread: thread.exchange(Script().machine, lambda: None, reopen=False))
-
-
-@pytest.mark.parametrize('ask', ASKS)
-def test_thread_that_begins_later_is_waited_for(
-        ask: Callable[[LinkThread], bool], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr('abdf1_ros.ports.link_thread._GLANCE', 0.001)
-    thread = LinkThread(Script(Rest()).machine, NoLine)
-    threading.Timer(0.02, thread.start).start()
-    assert ask(thread)
-    thread.stop()
-
-
-@pytest.mark.parametrize('ask', ASKS)
+@pytest.mark.parametrize('ask', [
+    LinkThread.release,
+    lambda thread: thread.exchange(Script().machine, lambda: None, reopen=False)])
 def test_thread_that_has_ended_is_not_waited_for(ask: Callable[[LinkThread], bool]) -> None:
     thread = Impatient(Broken().machine, NoLine, 100)
     thread.start()

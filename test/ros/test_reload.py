@@ -227,19 +227,16 @@ def test_link_that_does_not_take_the_files_is_the_end(
 
 @pytest.mark.parametrize('step', ['tell_plcs', 'LinkThread.exchange'])
 def test_signal_that_comes_during_a_reload_is_no_failure(
-        bench: Bench, step: str, monkeypatch: pytest.MonkeyPatch, capfd: Output) -> None:
-    places = [bench.map.with_name(name) for name in ('first', 'second')]
-    write_csv(bench.net, 'Baud,Timeout,Share', [f'115200,100,pty:{places[0]}'])
+        bench: Bench, step: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    place = bench.map.with_name('place')
+    write_csv(bench.net, 'Baud,Timeout,Share', [f'115200,100,pty:{place}'])
     assert bench.reload()[0]
-    write_csv(bench.net, 'Baud,Timeout,Share', [f'115200,100,pty:{places[1]}'])
     monkeypatch.setattr(f'abdf1_ros.ros.bridge.node.{step}',
                         lambda *_, **__: bench.node.begin_end())
     assert bench.reload() == (False, 'this node ends')
-    assert not bench.node.has_failed
     monkeypatch.undo()
     bench.end()
-    assert not any(map(Path.is_symlink, places))
-    assert 'FATAL' not in capfd.readouterr().err
+    assert not (place.is_symlink() or bench.node.has_failed)
 
 
 def test_files_that_cannot_be_taken_leave_topics_and_services_to_the_old_driver(
