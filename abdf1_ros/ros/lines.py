@@ -44,6 +44,7 @@ from abdf1_ros.ros.parameters.declared import take_given, wrong_names
 from abdf1_ros.ros.parameters.files import node_sections, parameter_files, parameter_tree
 from abdf1_ros.ros.process.main import EXIT_CONFIGURATION, make_parser, Program, REFUSALS, run_ros
 from abdf1_ros.ros.process.runner import Line, LinkFailed, Runner
+from abdf1_ros.settings.heartbeats import LONGEST_END
 from abdf1_ros.signals import EndRequest
 from abdf1_ros.text import printable
 from diagnostic_msgs.msg import DiagnosticArray
@@ -76,6 +77,10 @@ OPTIONS: dict[str, object] = {'lines': [], 'strict_lines': False}
 # Pause (s) before a line is started again after an internal error.
 RESTART_AFTER = 2.0
 
+# Longest time (s) that the end of a line with an internal error takes, until its PLCs have been
+# told and its writes have their results (``end_together``).
+_CLOSED_AFTER = LONGEST_END + 2.0
+
 _STATUS_PERIOD = 1.0
 
 # We do not need this service; without it, a hundred nodes take 251 instead of 264 MiB.
@@ -100,7 +105,7 @@ class RestartedLine(Line):
         self.restarts = 0
         self._make = make
         self.closing: threading.Thread | None = None
-        self.due = math.inf
+        self.due, self._closed_by = math.inf, -math.inf
         self._logger = get_logger(printable(name).strip('/').replace('/', '.'))
 
     def start(self) -> None:
@@ -151,7 +156,8 @@ class RestartedLine(Line):
         self.restarts += 1
         text = printable(str(error)) if isinstance(error, LinkFailed) else bug_text(error)
         self._logger.error(f'has ended by an internal error and is started again: {text}')
-        self.due = time.monotonic() + RESTART_AFTER
+        now = time.monotonic()
+        self.due, self._closed_by = now + RESTART_AFTER, now + _CLOSED_AFTER
         if self.node is not None:
             gone = Line(self.node, self._callbacks)
             self.node, self._callbacks = None, None
@@ -164,9 +170,9 @@ class RestartedLine(Line):
                 self.closing = closing
 
     def end_callbacks(self, give_up: float) -> None:
-        """End the callbacks; wait also for an old node that is being closed."""
+        """End the callbacks; wait also for an old node: it may still have to tell its PLCs."""
         if self.closing is not None:
-            self.closing.join(max(0.0, give_up - time.monotonic()))
+            self.closing.join(max(0.0, max(give_up, self._closed_by) - time.monotonic()))
         super().end_callbacks(give_up)
 
 
