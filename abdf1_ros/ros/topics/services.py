@@ -96,13 +96,18 @@ class RowServices:
         self._wake_executor = wake_executor
         self._group = ReentrantCallbackGroup()
         self._services: dict[str, Service] = {}
-        self._retired: list[Service] = []
+        self._retired: dict[str, Service] = {}
         self._rows: dict[str, tuple[Mapping, ...]] = {}
         self.calls: dict[str, _Call] = {}
 
     def open(self, driver: Driver, most: int, patience: float,  # noqa: A003
              wake_link: Callable[[], None]) -> None:
-        """Offer the services of the rows of a driver; keep those that exist already."""
+        """
+        Offer the services of the rows of a driver; keep those that exist already.
+
+        A retired service that still waits for calls is kept, too: two services of one name would
+        both execute the next call.
+        """
         self._driver, self._wake_link = driver, wake_link
         network = driver.network
         # A write waits for the line, and may then wait to be read back. A transaction follows each
@@ -113,7 +118,9 @@ class RowServices:
             else dict(_offered(driver.mappings, most))
         self._retire()
         for name in self._rows:
-            if name not in self._services:
+            if name in self._retired:
+                self._services[name] = self._retired.pop(name)
+            elif name not in self._services:
                 kind, answer = (SetBool, self._set) if name.startswith('~/set/') \
                     else (Trigger, self._read)
                 self._services[name] = self._node.create_service(
@@ -146,12 +153,12 @@ class RowServices:
 
     def _retire(self) -> None:
         """Mark services without a row; they are closed once all calls are answered."""
-        self._retired += [self._services.pop(name) for name in [*self._services]
-                          if name not in self._rows]
+        self._retired |= {name: self._services.pop(name) for name in [*self._services]
+                          if name not in self._rows}
 
     def _close_retired(self) -> None:
-        retired, self._retired = self._retired, []
-        for service in retired:
+        retired, self._retired = self._retired, {}
+        for service in retired.values():
             self._node.destroy_service(service)
 
     async def _set(self, name: str, request: SetBool.Request,
