@@ -146,10 +146,20 @@ class RestartedLine(Line):
             self._begin_again(error)
 
     @property
+    def _is_closing(self) -> bool:
+        return self.closing is not None and self.closing.is_alive()
+
+    @property
     def is_due(self) -> bool:
         """Return True if the line has to be started now."""
-        is_closing = self.closing is not None and self.closing.is_alive()
-        return time.monotonic() >= self.due and not is_closing
+        return time.monotonic() >= self.due and not self._is_closing
+
+    @property
+    def reason(self) -> str:
+        """Return why a line without a node does not run."""
+        if self._is_closing and time.monotonic() >= self._closed_by:  # its link hangs, maybe
+            return 'its old node does not end: restart the process'
+        return '; '.join(self.faults) or 'is started again'
 
     def _begin_again(self, error: Exception) -> None:
         """End the node in a thread, as this may take seconds; plan its restart."""
@@ -231,7 +241,7 @@ class LinesNode(AnsweringNode):
             level, text = max(level, WARN), f'{text}; {self._names.text}'
         values = {'lines': str(len(lines)), 'running': str(len(lines) - len(faulty)),
                   'restarts': str(sum(line.restarts for line in lines))}
-        values |= {line.name: '; '.join(line.faults) or 'is started again' for line in faulty}
+        values |= {line.name: line.reason for line in faulty}
         name = f'{self.get_fully_qualified_name().lstrip("/")}: lines'
         message = DiagnosticArray(status=[
             message_of(name, level, f'{WORDS[level]}: {text}', '', values)])

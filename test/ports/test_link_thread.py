@@ -422,6 +422,7 @@ def test_machine_for_another_port_never_has_the_one_that_is_open() -> None:
     woken = threading.Event()
 
     class Told(NoLine):
+
         def __init__(self) -> None:
             happened.append('opened')
 
@@ -429,6 +430,7 @@ def test_machine_for_another_port_never_has_the_one_that_is_open() -> None:
             happened.append('closed')
 
     class Late(LinkThread):
+
         def __setattr__(self, name: str, value: object) -> None:
             super().__setattr__(name, value)
             if name == 'has_turned' and happened == ['opened']:  # it has looked, and takes it now
