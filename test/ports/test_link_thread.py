@@ -418,38 +418,30 @@ def test_other_machine_goes_on_with_the_same_port(pty: Pty, link: Link) -> None:
 
 
 def test_machine_for_another_port_never_has_the_one_that_is_open() -> None:
-    happened: list[str] = []
+    states: list[str] = []
     woken = threading.Event()
-
-    class Told(NoLine):
-
-        def __init__(self) -> None:
-            happened.append('opened')
-
-        def close(self) -> None:
-            happened.append('closed')
 
     class Late(LinkThread):
 
         def __setattr__(self, name: str, value: object) -> None:
             super().__setattr__(name, value)
-            if name == 'has_turned' and happened == ['opened']:  # it has looked, and takes it now
-                happened.append('asked')
+            if name == 'has_turned' and self.state.is_open and not states:  # after its look
+                states.append('asked')
                 woken.clear()
                 threading.Thread(target=self.exchange, args=(
                     Script(Rest()).machine, lambda: None, True, '',
-                    lambda: happened.append('exchanged'))).start()
+                    lambda: states.append(self.state.text))).start()
                 assert woken.wait(PATIENCE)
 
         def wake(self) -> None:
             super().wake()
             woken.set()
 
-    thread = Late(Script(Rest()).machine, Told)
+    thread = Late(Script(Rest()).machine, NoLine)
     thread.start()
-    wait_until(lambda: 'exchanged' in happened)
+    wait_until(lambda: len(states) > 1)
     thread.stop()
-    assert happened[:4] == ['opened', 'asked', 'closed', 'exchanged']
+    assert states == ['asked', 'the port is being opened']
 
 
 def test_other_machine_on_a_port_that_is_opened_anew(pty: Pty, link: Link) -> None:
