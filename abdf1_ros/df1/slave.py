@@ -31,7 +31,7 @@ from typing import Protocol
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.accounting import count_control, count_fault, Tally
-from abdf1_ros.df1.frames import Control, Frame, Poll, Symbol, Unknown
+from abdf1_ros.df1.frames import Control, Frame, NOISE, Poll, Symbol, Unknown
 from abdf1_ros.df1.machine import (
     Heard,
     Listen,
@@ -280,16 +280,17 @@ def answer(machine: Machine, symbol: Symbol, handle: Callable[[Symbol], bytes],
 
     A master that has sent another symbol does not wait for the old answer any more. It would
     relate the old answer to the new symbol. So a poll or a message is ignored if another symbol,
-    or the beginning of one, has come after it.
+    or the beginning of one, has come after it. To ``handle`` it is then NOISE.
     """
     heard: Symbol | None = symbol
     while heard is not None:
         symbol, heard = heard, None
         if _wants_answer(symbol):
             heard = yield from _next_within(machine, machine.timing.tx_delay, look)
-            if heard is None and (machine.is_behind or machine.decoder.has_begun):
-                return
-        if heard is None and (data := handle(symbol)):
+            if heard is not None or machine.is_behind or machine.decoder.has_begun:
+                handle(NOISE)  # an ACK after it is not for our last message
+                continue
+        if data := handle(symbol):
             # An answer with a time limit waits until the caller, who has the port, has checked the
             # limit.
             limit = expires()

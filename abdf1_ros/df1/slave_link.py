@@ -26,7 +26,7 @@ from collections.abc import Callable
 import math
 
 from abdf1_ros.df1.accounting import Accounting
-from abdf1_ros.df1.frames import Frame, Symbol
+from abdf1_ros.df1.frames import Frame, NOISE, Symbol
 from abdf1_ros.df1.link import Link, LinkState
 from abdf1_ros.df1.machine import Machine, Procedure, Rest, Silence
 from abdf1_ros.df1.mode import LineMode
@@ -90,7 +90,7 @@ class SlaveLink(Link, Initiator):
     def _respond(self, symbol: Symbol) -> bytes:
         """Return the answer; ignore an old message: a master that still waits repeats it."""
         is_old = isinstance(symbol, Frame) and self._machine.may_be_old
-        return b'' if is_old else self._slave.respond(symbol)
+        return self._slave.respond(NOISE if is_old else symbol)
 
     def _serve_own(self, command: Packet) -> Packet:
         """Execute a command for us; refuse a command for another node: we are not a gateway."""

@@ -137,6 +137,17 @@ def test_poll_or_message_after_which_the_line_has_gone_on_is_not_answered() -> N
             assert (bench.hear(data) != b'') is is_answered
 
 
+def test_ack_after_an_ignored_symbol_is_not_for_our_message() -> None:
+    bench = SlaveBench(SETTINGS)
+    bench.hear(bench.frame(FROM_MASTER))
+    for pause, data in ((0.0, poll_frame(OTHER)), (30.0, bench.frame(FROM_MASTER, OTHER))):
+        assert bench.poll() == bench.own(FROM_MASTER.reply())  # the master does not hear it
+        bench.now += pause
+        bench.machine.handle_timeout(bench.now)
+        bench.hear(*([data + ACK] if not pause else [data, ACK]))
+    assert bench.poll() == bench.own(FROM_MASTER.reply())
+
+
 def test_reply_to_another_node_does_not_make_ours_a_repetition() -> None:
     bench = SlaveBench(SETTINGS)
     task = bench.add(own())
