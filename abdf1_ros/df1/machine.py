@@ -136,7 +136,8 @@ _PATIENCE_OF_SENDERS = 1.0
 # Longest rest (s) of a node that executes commands: without a deadline it would notice no pause.
 LONGEST_REST = 1.0
 
-# Seconds after a pause of this process in which bytes may still be old bytes of a buffer.
+# Seconds in which bytes may still be old bytes of a buffer: after a pause of this process, and at
+# the beginning of a connection to a device server.
 OLD = 0.5
 
 # Longest time (s) that an operating system or a device server holds bytes of a frame back.
@@ -274,7 +275,7 @@ class Machine:
 
     @property
     def may_be_old(self) -> bool:
-        """Tell whether a message may have waited while this process stood still."""
+        """Tell whether a message may have waited, as while this process stood still."""
         return self.now < self._old_until
 
     @property
@@ -320,6 +321,10 @@ class Machine:
         self.sender.begin(now, outlet)
         self._procedure = self._make_procedure(self)
         self._resume(None)
+
+    def treat_as_old(self) -> None:
+        """Treat the messages of the next half second as messages that may have waited."""
+        self._old_until = self.now + OLD
 
     def stop(self, error: Exception | None = None) -> None:
         """
@@ -411,7 +416,7 @@ class Machine:
             self.late += seconds
             self._last_pause = now, seconds
             if seconds > self._senders_patience:
-                self._old_until = now + OLD
+                self.treat_as_old()
         step = self._step
         if isinstance(step, Send) and not self._is_listening:  # its delay is over
             self._transmit(step)

@@ -372,6 +372,8 @@ class Driver:
     def _run(self) -> Procedure:
         """Open the queues; return the procedure of the link, which ends with the port."""
         self._connect()
+        if self._settings.may_store:  # also what comes from the line
+            self.machine.treat_as_old()
         if self.overheard is not None:
             self.overheard.begin(self.machine.now)
         self.readings.reads.begin(self.machine.now)

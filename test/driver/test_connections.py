@@ -146,6 +146,16 @@ def test_banner_noise_and_a_reply_to_another_client_are_not_heard() -> None:
     assert set(bench.results()) == {NOT_HEARD}
 
 
+@pytest.mark.parametrize('mode', _WIRING)
+def test_command_of_a_plc_that_the_server_may_have_kept_has_to_come_again(mode: str) -> None:
+    bench = Queue(mode, [], is_open=True)
+    echo = frame(Packet(200, 1, 0x06, 0, 1, b'\0').encode())
+    for seconds, executed in ((0.0, 0), (0.4, 0), (0.1, 1)):
+        bench.run(seconds)
+        bench.driver.machine.receive_data(echo, bench.clock())
+        assert bench.driver.counters.commands_received == executed
+
+
 def test_connection_whose_stations_are_all_silent_is_unheard_again() -> None:
     bench = Queue(is_open=True)
     bench.run(1.0)
