@@ -305,7 +305,7 @@ class MasterLine:
         packet = Packet.decode(frame.data)
         station = self.stations[self.stations.via(packet.src)]
         self.counters.messages_received += 1
-        self.stations.heard(packet.src, self.machine.now)
+        self.stations.heard(station.number, self.machine.now)  # maybe a gateway's own reply
         if packet.is_reply and packet.dst == self.settings.station and station.note_new(packet):
             self.accounting.received(packet)
             if not self._take_reply(packet.src, packet):
