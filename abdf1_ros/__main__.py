@@ -19,7 +19,7 @@ from __future__ import annotations
 import os
 import sys
 
-from abdf1_ros.cli.main import COMMANDS, run
+from abdf1_ros.cli.main import COMMANDS, run, written
 
 _HELP = ('-h', '--help', 'help')
 
@@ -30,26 +30,28 @@ def main() -> int:
     if name in COMMANDS:
         sys.argv[:2] = [name]
         return run(name)
-    return _help(name, 'abdf1' if program == 'abdf1' else 'python3 -m abdf1_ros')
+    called = 'abdf1' if program == 'abdf1' else 'python3 -m abdf1_ros'
+    return written(called, _help(name, called))
 
 
 def _help(name: str, called: str) -> int:
     """Print the version or the help, and the fault of an unknown name; return the exit status."""
-    from difflib import get_close_matches  # commands do not need it
+    from contextlib import suppress  # commands need none of these
+    from difflib import get_close_matches
 
     from abdf1_ros.paths import package_version
     from abdf1_ros.text import printable
-    if name == '--version':
-        print(f'abdf1_ros {package_version()}')
-        return 0
-    if name and name not in _HELP:
+    said, fault = name == '--version' or name in _HELP, ''
+    if name and not said:
         meant = get_close_matches(name, COMMANDS, 1)
-        print(f'{called}: "{printable(name)}" is not a command'
-              + (f'; did you mean {meant[0]}?' if meant else ''), file=sys.stderr)
+        fault = f'{called}: "{printable(name)}" is not a command' \
+            f'{f"; did you mean {meant[0]}?" if meant else ""}\n'
     listed = '\n'.join(f'  {command:10} {purpose}' for command, (_, purpose) in COMMANDS.items())
-    print(f'usage: {called} COMMAND ...\n\n{listed}\n\neach has --help',
-          file=sys.stdout if name in _HELP else sys.stderr)
-    return 0 if name in _HELP else 2
+    text = f'abdf1_ros {package_version()}' if name == '--version' else \
+        f'{fault}usage: {called} COMMAND ...\n\n{listed}\n\neach has --help'
+    with suppress(OSError):  # as argparse does for its help
+        print(text, file=sys.stdout if said else sys.stderr)
+    return 0 if said else 2
 
 
 if __name__ == '__main__':

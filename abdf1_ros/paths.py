@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 import argparse
+from contextlib import suppress
 from pathlib import Path
 import sys
 
@@ -43,7 +44,8 @@ class ShowVersion(argparse.Action):
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
         """Print the version and end."""
-        print(f'abdf1_ros {package_version()}')
+        with suppress(OSError):  # as argparse does for its help
+            print(f'abdf1_ros {package_version()}')
         parser.exit()
 
 

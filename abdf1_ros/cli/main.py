@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from types import FrameType
     from typing import NoReturn
 
-_NOT_INSTALLED = 2
+_NOT_INSTALLED = _NOT_PRINTED = 2
 _INTERRUPTED = 130  # for commands whose exit status means success or failure
 
 COMMANDS = {
@@ -70,9 +70,31 @@ def run(name: str) -> int:
         print(f'{os.path.basename(sys.argv[0])}: the Python module {error.name} is missing; '
               f'{_cure(error.name)}', file=sys.stderr)
         return _NOT_INSTALLED
+    except SystemExit as end:
+        if end.code:
+            raise
+        sys.exit(written(name, 0))  # of --help or --version
     if name in _LEAVING:
         _leave(status)
     return _ended(status)
+
+
+def written(name: str, status: int) -> int:
+    """
+    Return ``status`` after the output is written, or 2 and print the reason if that fails.
+
+    Otherwise the interpreter would complain at its end, and exit with status 120. That the reader
+    has left is not a failure.
+    """
+    try:
+        sys.stdout.flush()
+    except OSError as error:
+        from abdf1_ros.signals import drop  # slow
+        drop(sys.stdout.fileno())
+        if not isinstance(error, BrokenPipeError):
+            print(f'{name}: cannot print: {error.strerror}', file=sys.stderr)
+            return _NOT_PRINTED
+    return status
 
 
 def __getattr__(name: str) -> Callable[[], int]:

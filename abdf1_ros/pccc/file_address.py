@@ -154,6 +154,8 @@ class FileAddressing(Addressing):
 
     def _with_word(self, address: Address, word: int) -> Address:
         kind, layout = address.file_type, address.layout
+        if kind is FileType.STRING:
+            raise AddressSyntaxError(_whole_string(address))
         if not kind.is_structure:
             raise AddressSyntaxError(f'elements of {kind.value} files have no numbered words')
         if word >= layout.words:
@@ -210,15 +212,20 @@ def _two_words(kind: FileType) -> str:
     return 'an int32' if kind.is_function else 'a float32'
 
 
+def _whole_string(address: Address) -> str:
+    return f'a string is read and written as a whole; write {address}'
+
+
 def _with_member(address: Address, name: str) -> Address:
     members = address.layout.members
     member = members.get(name)
     # The name of a bit may follow the number of its word; the name of a value may not.
     if member is None or address.bit is not None or (
             address.word and (member.bit is None or member.word != address.word)):
-        if address.file_type is FileType.STRING and name == 'LEN':
+        if address.file_type is FileType.STRING:
             raise AddressSyntaxError(
-                f'the length is part of the string; read {address}, which is as long as that')
+                f'the length is part of the string; read {address}, which is as long as that'
+                if name == 'LEN' else _whole_string(address))
         known = ', '.join(members) or 'none'
         raise AddressSyntaxError(
             f'{shown(name)} is not a member; members of {address.file_type.value} files: {known}')

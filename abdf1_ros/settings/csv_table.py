@@ -181,7 +181,8 @@ def _read_text(path: str) -> str:
         with Path(path).open('rb') as file:
             raw = file.read(_LARGEST + 1)
     except OSError as error:
-        where = '' if Path(path).is_absolute() else f' in the folder {Path.cwd()}'
+        is_looked_for = isinstance(error, FileNotFoundError) and not Path(path).is_absolute()
+        where = f' in the folder {Path.cwd()}' if is_looked_for else ''
         raise Problem(path, f'cannot be read: {error.strerror or error}{where}') from None
     if raw.startswith(_WORKBOOKS):
         raise Problem(path, 'is a workbook or a project of some program, not text; save what is '

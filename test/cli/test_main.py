@@ -28,6 +28,7 @@ from types import SimpleNamespace
 from typing import NoReturn
 from zipfile import ZipFile
 
+from abdf1_ros.__main__ import main
 from abdf1_ros.cli import main as commands
 from abdf1_ros.cli import terminal
 from abdf1_ros.cli.main import COMMANDS
@@ -194,6 +195,23 @@ def test_every_command_tells_its_version_and_what_it_takes(
         assert [text for text in texts if text not in said] == []
         # Text of a user, such as a tag, may have characters that a terminal does not know.
         assert output.errors == 'backslashreplace' or name in ('node', 'lines', 'demo')
+
+
+def test_help_without_room_or_reader(
+        monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr(signal, 'signal', lambda *_: None)
+    reader, writer = os.pipe()
+    os.close(reader)
+    for name, given in (('abdf1', '--help'), ('abdf1', '--version'), ('plc', '--version')):
+        for place, status, reason in (
+                ('/dev/full', 2, f'{name}: cannot print: No space left on device\n'),
+                (os.dup(writer), 0, '')):
+            monkeypatch.setattr(sys, 'argv', ['abdf1', *['plc'] * (name == 'plc'), given])
+            with open(place, 'w') as stdout, pytest.raises(SystemExit) as end:
+                monkeypatch.setattr(sys, 'stdout', stdout)
+                sys.exit(main())
+            assert (end.value.code, capsys.readouterr().err) == (status, reason)
+    os.close(writer)
 
 
 @pytest.mark.parametrize(('name', 'args', 'status'), [

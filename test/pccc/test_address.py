@@ -250,6 +250,8 @@ def test_number_after_a_timer_is_no_bit_unless_it_has_a_name(
 
 @for_all(('text', 'family', 'expected'), [
     ('ST9:0.LEN', SLC, 'the length is part of the string; read ST9:0, which is as long as that'),
+    *((f'ST9:3.{part}', SLC, 'a string is read and written as a whole; write ST9:3')
+      for part in ('1', 'DATA', 'DATA[0]')),
     ('L10:0/5', SLC, 'bits of an L file have no address; read L10:0 as int32 and take bit 5 '
                      'from it'),
     ('CT20:0', PLC5, 'CT files (ControlNet transfer) cannot be read or written here; file types '

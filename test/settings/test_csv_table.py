@@ -235,7 +235,8 @@ def test_what_is_no_file_of_text(path: Path, tmp_path: Path) -> None:
 def test_folder_of_a_relative_path_is_named(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(ConfigurationError) as caught:
-        read_table('net.csv', ['Baud'])
-    assert str(caught.value) == (
-        f'net.csv: cannot be read: No such file or directory in the folder {tmp_path}')
+    for name, reason in (('net.csv', f'No such file or directory in the folder {tmp_path}'),
+                         ('.', 'Is a directory')):
+        with pytest.raises(ConfigurationError) as caught:
+            read_table(name, ['Baud'])
+        assert str(caught.value) == f'{name}: cannot be read: {reason}'
