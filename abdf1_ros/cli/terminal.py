@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 import difflib
 import errno
 from functools import partial
@@ -73,8 +73,15 @@ class NoPort(OSError):
 def tell(name: str, text: str, code: int | None = None) -> None:
     """Print ``text`` on standard error, after the name of a command, in the colour ``code``."""
     line = f'{name}: {printable(text)}'
-    with suppress(OSError):  # nothing reads the output
-        print(colour(line, code, sys.stderr) if code else line, file=sys.stderr, flush=True)
+    _print_aside(colour(line, code, sys.stderr) if code else line)
+
+
+def _print_aside(text: str, end: str = '\n') -> None:
+    """Print on standard error; a reader that has left or a full disk does not end the work."""
+    try:
+        print(text, end=end, file=sys.stderr, flush=True)
+    except OSError:
+        drop(sys.stderr.fileno())
 
 
 def is_wanted(question: str) -> bool:
@@ -327,16 +334,16 @@ class Progress:
         if now < self._next:
             return
         if self._live:
-            print(f'\r\x1b[K{text}', end='', file=sys.stderr, flush=True)
+            _print_aside(f'\r\x1b[K{text}', end='')
             self._is_shown = True
         else:
-            print(text, file=sys.stderr, flush=True)
+            _print_aside(text)
             self._next = now + _PROGRESS_DELAY
 
     def clear(self) -> None:
         """Remove the progress line before other output."""
         if self._is_shown:
-            print('\r\x1b[K', end='', file=sys.stderr, flush=True)
+            _print_aside('\r\x1b[K', end='')
             self._is_shown = False
 
 
