@@ -257,6 +257,7 @@ def test_repetition_of_a_command_whose_reply_was_acknowledged(timeout: float,
     seconds = max(1.0, timeout) + 0.25 * is_counted
     for pause, executed in ((seconds - 0.01, 1), (seconds + 0.01, 2)):
         peer = bench(timeout=timeout)
+        peer.hear_packet(REPLY)  # another TNS, but not that of a command
         for number in (0, -1) * is_counted:
             peer.hear_packet(later(THEIRS, number))
             peer.hear(ACK)
@@ -299,6 +300,10 @@ def test_command_that_has_left_is_asked_after_however_old_it_is(response: bytes,
     peer.wait(CMD_TIMEOUT + 0.05)  # from the ACK on, not from the pause after it
     error = CommandTimeout if response == ACK else CommandExpired
     assert (type(task.result), task.sent, peer.counts()['commands_sent']) == (error, True, 1)
+    late = peer.add(later(COMMAND, 1))
+    late.expires = peer.now - 0.001
+    peer.machine.wake(peer.now)
+    assert (type(late.result), late.sent) == (CommandExpired, False)
 
 
 def test_reply_is_not_taken_after_its_time_although_nobody_has_looked() -> None:
@@ -334,12 +339,13 @@ def test_replies_of_a_gateway_in_place_of_a_station_are_counted_like_late_ones()
 
 
 def test_second_command_goes_out_and_has_its_reply_while_the_first_waits() -> None:
-    peer = PeerBench(LinkSettings(station=None, max_outstanding=2))
-    peer.begin(COMMAND)
-    peer.said()
-    setattr(peer, 'next_due', lambda: peer.now + 0.5)
-    peer.hear(ACK)
-    assert peer.machine.next_call == peer.now + 0.5
+    for most, due in ((1, 1.0), (2, 0.5)):  # without room, a due task wakes nothing
+        peer = PeerBench(LinkSettings(station=None, max_outstanding=most))
+        peer.begin(COMMAND)
+        peer.said()
+        setattr(peer, 'next_due', lambda peer=peer: peer.now + 0.5)
+        peer.hear(ACK)
+        assert peer.machine.next_call == peer.now + due
     task = peer.begin(later(COMMAND, 1))
     peer.said()
     assert peer.hear_packet(later(REPLY, 1)) == ACK  # before the ACK to its command
@@ -354,3 +360,13 @@ def test_short_wait_is_for_an_inactive_station() -> None:
     peer.machine.wake(peer.now)
     assert peer.said() == peer.frame(later(COMMAND, 1))
     assert [round(at, 1) for at, data in peer.wait(1.05)] == [TIMEOUT]
+
+
+def test_inactive_station_gets_one_try() -> None:
+    for response, wait in ((NAK, 0.2), (b'', 1.2)):
+        peer = bench()
+        peer.stations.lost(1, peer.now)
+        task = peer.begin(COMMAND)
+        assert peer.said() == peer.frame(COMMAND)
+        assert (peer.hear(response), peer.wait(wait)) == (b'', [])
+        assert isinstance(task.result, StationInactive)
