@@ -15,10 +15,12 @@
 """Lines that are made or opened here: their names, who gets them, and what they leave behind."""
 
 from contextlib import closing, suppress
+import fcntl
 from functools import partial
 import os
 from pathlib import Path
 import socket
+import termios
 import time
 
 from abdf1_ros.line_names import device_of
@@ -32,6 +34,8 @@ import pytest
 from support.counting import open_files
 from support.device_server import OWN_HOST
 from support.ptys import PATIENCE, Pty, read_exactly
+
+_TIOCGEXCL = 0x80045440  # of Linux: whether TIOCEXCL is set
 
 
 def exchange(port: Port, other: int, wake: int) -> None:
@@ -66,6 +70,7 @@ def test_place_has_nothing_of_the_program_before(tmp_path: Path, wake: int) -> N
             line.open()
         for _ in range(3):
             client = os.open(name, os.O_RDWR | os.O_NOCTTY)
+            assert fcntl.ioctl(client, _TIOCGEXCL, bytes(4)) == bytes(4)
             port = line.open()
             exchange(port, client, wake)
             port.write(b'never read')
@@ -81,6 +86,7 @@ def test_place_has_nothing_of_the_program_before(tmp_path: Path, wake: int) -> N
             # Another one that comes and goes before anybody looks.
             client = os.open(name, os.O_RDWR | os.O_NOCTTY)
             os.write(client, b'never to be executed')
+            fcntl.ioctl(client, termios.TIOCEXCL)  # but the next one need not be root
             os.close(client)
             with pytest.raises(NoClient):
                 line.open()
@@ -89,7 +95,7 @@ def test_place_has_nothing_of_the_program_before(tmp_path: Path, wake: int) -> N
 
 def test_place_that_a_program_keeps_for_itself_for_ever_is_made_again(
         tmp_path: Path, wake: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    name, files = str(tmp_path / 'plc'), open_files()
+    name, files, came = str(tmp_path / 'plc'), open_files(), list[int]()
     with closing(PtyPlace(name)) as line:
         client, before = os.open(name, os.O_RDWR | os.O_NOCTTY), os.readlink(name)
         with monkeypatch.context() as patch:  # TIOCEXCL, which does not keep out root
@@ -97,6 +103,12 @@ def test_place_that_a_program_keeps_for_itself_for_ever_is_made_again(
             port = line.open()
             os.close(client)
             port.close()
+            with pytest.raises(NoClient), monkeypatch.context() as later:
+                later.setattr(line, 'drop_unread', lambda: (  # the next program comes just then
+                    came.append(os.open(name, os.O_RDWR | os.O_NOCTTY)), os.open('/none', 0)))
+                line.open()
+            assert os.readlink(name) == before
+            os.close(came[0])
             with pytest.raises(NoClient):
                 line.open()
         client = os.open(name, os.O_RDWR | os.O_NOCTTY)
@@ -112,7 +124,9 @@ def test_wire_loses_what_no_program_takes(tmp_path: Path, wake: int) -> None:
     with closing(PtyWire(name)) as line, closing(line.open()) as port:
         for looks in (0, 1):  # at first the program comes before we look
             port.write(bytes(100_000))
-            assert [port.read(0.0, wake) for _ in range(looks)] == [b''] * looks
+            begun = time.monotonic()
+            assert [port.read(0.03, wake) for _ in range(looks)] == [b''] * looks
+            assert time.monotonic() - begun >= looks * 0.029  # it waits asleep
             client = os.open(name, os.O_RDWR | os.O_NOCTTY)
             exchange(port, client, wake)
             port.write(bytes(100_000))  # it does not read

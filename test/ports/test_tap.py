@@ -24,10 +24,12 @@ import termios
 import threading
 import time
 from typing import Any
+from unittest.mock import Mock
 
 from abdf1_ros.df1.frames import Damaged
 from abdf1_ros.df1.listen import SecondPort
 from abdf1_ros.ports import listening, serial_device
+from abdf1_ros.ports.descriptor import DescriptorPort
 from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.serial_device import SerialDevice
@@ -273,11 +275,17 @@ def test_port_that_cannot_be_opened(ptys: list[Pty], tmp_path: Path) -> None:
     assert not first.is_symlink()  # the first has been closed again
 
 
-def test_lost_port_ends_it_with_an_error(ptys: list[Pty]) -> None:
+def test_lost_port_ends_it_with_an_error(
+        ptys: list[Pty], monkeypatch: pytest.MonkeyPatch) -> None:
     with tap(ptys[0].name, ptys[1].name) as listening:
         ptys[1].close()
         with pytest.raises(OSError, match='^(Input/output error|the other end has closed)'):
             list(listening.chunks(PATIENCE, PATIENCE, lambda: None))
+    gone = BrokenPipeError(errno.EPIPE, 'it is gone')  # this error of stdout ends a program
+    monkeypatch.setattr(DescriptorPort, 'read', Mock(side_effect=gone))
+    with tap(ptys[0].name) as listening, pytest.raises(OSError, match='^it is gone$') as caught:
+        list(listening.chunks(PATIENCE, PATIENCE, lambda: None))
+    assert caught.type is OSError
 
 
 def test_it_ends_when_told_or_when_the_time_is_up(ptys: list[Pty]) -> None:
@@ -308,7 +316,9 @@ def test_what_nothing_takes_is_passed_on_and_counted(
             ptys[0].write(bytes([number]))
             assert ptys[1].read(1) == bytes([number])
         chunks = listening.chunks(PATIENCE, PATIENCE, list)
-        found = [(next(chunks).data[0], listening.new_losses()) for _ in range(3)]
-        ptys[0].write(b'\x08')
-        found.append((next(chunks).data[0], listening.new_losses()))
-        assert found == [(0, 0), (1, 0), (2, 0), (8, 5)]
+        found = []
+        for number in (0, 1, 2, 8, 9):
+            if number > 2:
+                ptys[0].write(bytes([number]))
+            found.append((next(chunks).data[0], listening.new_losses(), listening.new_losses()))
+        assert found == [(0, 0, 0), (1, 0, 0), (2, 0, 0), (8, 5, 0), (9, 0, 0)]

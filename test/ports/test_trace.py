@@ -19,6 +19,7 @@ import threading
 from types import SimpleNamespace
 from unittest.mock import Mock
 
+from abdf1_ros.df1.packet import Packet
 from abdf1_ros.ports import trace as trace_module
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.trace import PortOpener, Trace, TracedPort
@@ -130,6 +131,8 @@ def test_line_does_not_wait_for_a_disk_that_stands_still(
             for byte in written:
                 port.write(bytes([byte]))
         if has_ended:
+            monkeypatch.setattr(trace_module, 'MOST_WAITING', 0)
+            port.write(b'\x04')
             monkeypatch.setattr(trace_module, 'LAST_CHUNKS', 0.0)
             trace.close()
             monkeypatch.undo()
@@ -144,20 +147,22 @@ def test_line_does_not_wait_for_a_disk_that_stands_still(
     assert [chunk.data for chunk in chunks_of(tmp_path / 'x')] == \
         [*len(all_lost) * [b'\x01', *[b'\x02'] * 3], b'\x03']
     assert (tmp_path / 'x').read_text().endswith(
-        f'# lines lost here: {lost}; the disk was too slow\n0.000000 > 03\n')
+        f'# lines lost here: {lost}; the disk was too slow\n0.000000 > 03\n'
+        + has_ended * '# lines lost here: 1; the disk was too slow\n')
     assert errors == [f'{tmp_path}/x: the disk was too slow; lines lost: {lost}'
-                      for lost in all_lost]
+                      for lost in (*all_lost, *[1] * has_ended)]
 
 
 def test_opener_records_across_openings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # the clock is asked once for the beginning
-    monkeypatch.setattr(trace_module, 'time', SimpleNamespace(monotonic=iter([-1e6]).__next__))
+    monkeypatch.setattr(trace_module, 'time', SimpleNamespace(monotonic=iter([-1e9]).__next__))
     pty = Pty(tmp_path / 'line')
     opener = PortOpener(PortSettings(str(pty.name), baud=19200))
     opener.trace(str(tmp_path / 'x'), 1e6, {'check': 'BCC', 'duplex': 'half'}, pytest.fail)
     for data, check in ((b'\x01', 'BCC'), (b'\x02', 'CRC')):
         opener.use(opener.settings, {'check': check, 'duplex': 'full'})  # as new files have it
         port = opener.open()
+        opener.note_guest('tcp:4501', Packet(1, 0, 0x0F, 0, data[0]))
         port.write(data)
         assert pty.read(1) == data
         port.close()
@@ -166,7 +171,10 @@ def test_opener_records_across_openings(tmp_path: Path, monkeypatch: pytest.Monk
     opener.close()
     assert 'trace' not in {thread.name for thread in threading.enumerate()}
     settings: dict[str, str] = {}
-    assert [chunk.data for chunk in chunks_of(tmp_path / 'x', settings)] == [b'\x01', b'\x02']
+    assert [(chunk.data, chunk.guest, (chunk.time or 0.0) > 1e9)
+            for chunk in chunks_of(tmp_path / 'x', settings)] == [
+        (b'\x01', '0001 tcp:4501', True), (b'\x02', '0002 tcp:4501', True)]
+    assert (tmp_path / 'x').read_text().count(f'# port: {pty.name}\n# baud: 19200\n') == 3
     assert (settings['baud'], settings['check'], settings['duplex'], settings['port']) == (
         '19200', 'CRC', 'full', str(pty.name))
     assert settings['begun'][:2] == '20'
