@@ -205,15 +205,16 @@ def test_read_of_a_guest_is_the_question_where_there_are_no_rows_no_write(mode: 
     bench = Queue(mode, [every], share='tcp:6000', is_open=True)
     guest, answers = Guest('tcp:6000', ShareAccess.ALL), list[Packet]()
 
-    def ask(*commands: bytes) -> None:
+    def ask(*commands: bytes, dst: int = 1) -> None:
         for data in commands:
             bench.driver.guests.put(GuestCommand(
-                guest, Packet(1, 9, 0x0F, 0, 1, data), bench.clock(), answers.append))
+                guest, Packet(dst, 9, 0x0F, 0, 1, data), bench.clock(), answers.append))
         bench.line.wake(bench.driver.machine)
         bench.run(1.0)
 
     write, read = b'\xAA\x02\x07\x89\0\0\x05\0', b'\xA2\x02\x07\x89\0\0'
     ask(write, write, read)
+    ask(read, dst=7)  # a station that has never been heard shows nothing about the connection
     ask(write)
     bench.device.hear = bench.keep
     bench.at(bench.clock() + 0.1, lambda: bench.write(every, [9]))
@@ -222,7 +223,8 @@ def test_read_of_a_guest_is_the_question_where_there_are_no_rows_no_write(mode: 
     bench.let_through()
     ask(write, write, read)
     ask(write)
-    assert [reply.sts for reply in answers] == [7, 7, 0, 0, 2, 7, 7, 7, 7, 7, 0, 0]
+    assert [reply.sts for reply in answers] == [
+        7, 7, 0, 7 if mode == 'Master' else 2, 0, 2, 7, 7, 7, 7, 7, 0, 0]
     assert bench.values_written() == [5, 5, *[9] * (mode == 'Peer'), 5]  # what was kept
     assert bench.listener.outcomes() == [
         Outcome.UNKNOWN if mode == 'Peer' else Outcome.BROADCAST]

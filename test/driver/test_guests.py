@@ -69,11 +69,13 @@ def test_reply_of_the_plc_comes_back_with_the_numbers_of_the_guest(mode: str, ds
     bench = bench_of(mode)
     bench.open()
     program = Program(bench)
-    command = program.ask(READ_N7, dst)
-    bench.run(1.0)
-    (_, reply), = program.replies
-    assert reply == command.reply(b'\x10\x10')
-    assert 0.0 < program.guest.slowest < 0.3
+    for slowest in (9.0, 0.0):
+        program.guest.slowest = slowest
+        command = program.ask(READ_N7, dst)
+        bench.run(1.0)
+        assert program.replies.pop()[1] == command.reply(b'\x10\x10')
+        assert slowest <= program.guest.slowest < slowest + 0.3 * (not slowest) + 0.001
+    assert program.guest.slowest > 0.0
 
 
 @pytest.mark.parametrize(('stations', 'meant'), [((1,), 1), ((1, 3), 2), ((1, 2), 2)])
@@ -348,14 +350,16 @@ def test_read_of_all_stations_is_not_sent_and_has_no_success() -> None:
 def test_every_command_has_one_reply_in_time_when_replies_are_lost() -> None:
     bench = bench_of()
     program = Program(bench, ShareAccess.WRITE)
+    program.guest.listener = told = Told()
     bench.far.say = lambda data: b'' if data.startswith(b'\x10\x02') else data
     for number in range(10):
-        program.ask(WRITE_N7 if number % 2 else READ_N7)
+        program.ask(READ_N7 if number % 2 else WRITE_N7)
         bench.run(2.0)
     bench.run(10.0)
     assert len(program.replies) == 10
     assert set(program.statuses) <= {0x01, 0x02, 0x05, 0x07}
     assert program.statuses[0] in (0x02, 0x05)  # it was sent
+    assert len(told.words) == sum(sts in (0x02, 0x05) for sts in program.statuses[::2])
 
 
 def beating_bench(mode: str, polling: str = 'Message') -> DriverBench:
