@@ -68,6 +68,8 @@ def test_ack_goes_to_the_station_that_spoke() -> None:
     assert line.say(ACK) == b''
     assert [slave.counters.acks_received for slave in line.slaves] == [1, 1]
     assert (line.say(poll_frame(7)), line.say(poll_frame(8))) == (line.frame(FROM_MASTER), EOT)
+    line.slaves[1].reset()  # after a loss of its port it executes the same command again
+    assert (line.send(other), line.say(poll_frame(8))) == (ACK, line.frame(other))
 
 
 def test_withdraw_does_not_touch_replies() -> None:

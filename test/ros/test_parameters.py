@@ -155,8 +155,9 @@ def test_what_the_files_say_is_shown_and_nobody_else_sets_it(
     shown, configuration = ShownFiles(node), configure(node)
     node.declare_parameter('free', '0')
     before = set(node.get_parameters_by_prefix(''))
-    for _ in range(3):  # files that are read again are shown anew
-        shown.show(configuration.network, configuration.shown_rows())
+    rows = configuration.shown_rows()
+    for shown_rows in (rows, (), (), rows):  # files that are read again are shown anew
+        shown.show(configuration.network, shown_rows)
     names = set(node.get_parameters_by_prefix('')) - before
     assert names >= {f'net.{field}' for field in (
         'station', 'mode', 'plc_type', 'error_code', 'nak_retries', 'enq_retries', 'cmd_timeout',
@@ -483,6 +484,7 @@ def test_parameters_of_the_command_line_of_many_lines(make_node: Nodes, files: F
     args = ['--ros-args', '-p', 'press:read_only:=true', '-p', 'gain:=3', '-p', 'press:gain:=4',
             '-p', 'abdf1:read_only:=true', '-p', 'parameters:loss:=3']
     node = make_node(files, cli_args=args)
+    assert Arguments.of(args).typed_for('/hall/press') == {'gain': '3'}  # the name is a full name
     assert problems_of(node, Arguments.of(args, ['/press'])) == [
         'parameter abdf1:read_only: this node is /parameters; leave out "abdf1:"',
         'parameter loss: there is no such parameter; another version may have it']
