@@ -27,7 +27,7 @@ from unittest.mock import Mock
 from abdf1_ros.cli.conform import main
 from abdf1_ros.client import Client
 from abdf1_ros.conform.case import Case, CaseResult, Permission, Verdict
-from abdf1_ros.conform.ends import AskingEnd, Words
+from abdf1_ros.conform.ends import AskingEnd, RadioEnd, RadioServerEnd, Words
 from abdf1_ros.conform.wire import Wire
 from abdf1_ros.df1.frames import Damaged
 from abdf1_ros.errors import Abdf1Error
@@ -207,6 +207,18 @@ def test_program_that_reads_is_answered_as_a_plc_answers(
     assert '- result: 1 passed, 0 failed, 0 skipped\n' in said.out and link in said.err
     assert '- port: pty\n' in said.out and made.call_args.kwargs['char_time'] == 0
     assert read and not Path(link).is_symlink()  # it would lead to another program's terminal
+
+
+@for_all(('target', 'kind'), [('radio', RadioEnd), ('radio-client', RadioServerEnd)])
+def test_end_of_a_radio_network_has_the_number_of_the_user(
+        target: str, kind: type, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, part in (('open_port', lambda settings: Mock(read=lambda *wait: b'')),
+                       ('Wire', made := Mock(side_effect=Wire)),
+                       ('run_cases', run := Mock(return_value=[]))):
+        monkeypatch.setattr(f'abdf1_ros.cli.conform.{name}', part)
+    assert main([target, '--port=/x', '--station=2', '--answer-time=0.01']) == 1
+    end = run.call_args.args[2]
+    assert (type(end), end.station, made.call_args.kwargs['is_radio']) == (kind, 2, True)
 
 
 @pytest.mark.parametrize(('args', 'status', 'text'), [

@@ -15,17 +15,18 @@
 """Each fault of an end is found by the case that names its rule; what is allowed passes."""
 
 from collections.abc import Callable
+from contextlib import nullcontext
 import os
 from pathlib import Path
 
-from abdf1_ros.conform import codec
+from abdf1_ros.conform import codec, ends
 from abdf1_ros.conform.case import CaseResult, Target, Verdict
 from abdf1_ros.conform.cases import CASES
 from abdf1_ros.conform.codec import BlockCheck, Symbol, SymbolKind
 from abdf1_ros.conform.data import changes_nothing
 from abdf1_ros.conform.ends import AskingEnd, MasterEnd, PeerEnd, SlaveEnd, Words
 from abdf1_ros.conform.report import line_of
-from abdf1_ros.conform.wire import Failed, Wire
+from abdf1_ros.conform.wire import Failed, Skipped, Wire
 import pytest
 from support.cases import compare_stored, for_all
 from support.conformance import failures, results_of
@@ -470,6 +471,23 @@ def test_numbers_of_commands_begin_again_after_the_last() -> None:
     end = PeerEnd(Wire(line, BlockCheck.CRC, line.clock, is_half_duplex=False), 253, 254, 0xFFFF)
     assert end.another == 252
     assert [end.command()[4:6] for _ in range(2)] == [b'\xFF\xFF', b'\0\0']
+
+
+@for_all(('waits', 'is_judged'), [(4, False), (6, True)])  # twice 0.6 s and 0.3 s are the limit
+def test_reply_by_radio_is_taken_if_a_missing_one_delays_the_next_command(
+        waits: int, is_judged: bool) -> None:
+    line = Babble()
+    end = ends.RadioServerEnd(
+        Wire(line, BlockCheck.CRC, line.clock, is_half_duplex=False, is_radio=True), 1,
+        lambda command: command[1::-1])
+    commands = [Symbol(SymbolKind.MESSAGE, b'', bytes((1, number, 6, 0, number, 0)))
+                for number in range(3)]
+    said = [codec.message(command.data, BlockCheck.CRC) for command in commands[:0:-1]]
+    parts, wait = [said[0], *[b''] * (waits - 1), said[1], b''], line.read
+    line.read = lambda timeout: wait(timeout) + parts.pop()  # type: ignore[method-assign]
+    with nullcontext() if is_judged else pytest.raises(Skipped, match='comes too late'):
+        end.expect_taken(commands[0])
+    assert line.sent == is_judged * codec.message(b'\2\1', BlockCheck.CRC)
 
 
 @for_all('wait', [SlaveEnd.next_command, SlaveEnd.next_poll])
