@@ -510,6 +510,7 @@ def test_length_of_a_range_counts_values_of_the_type(kind: str, length: int) -> 
     (PLC5, 'I:001/00{16}', ['I:001/00, and Length 16']),
     (SLC, 'T4:0.ACC-T4:2.ACC', ['T4:0.ACC', 'T4:1.ACC', 'T4:2.ACC', 'T4:0, and Length 9']),
     (SLC, 'T4:0.ACC{3}', ['T4:0.ACC', 'T4:1.ACC', 'T4:2.ACC', 'T4:0, and Length 9']),
+    (SLC, 'T4:0.0{3}', ['T4:0', 'T4:1', 'T4:2', 'T4:0, and Length 9']),
     (PLC3, 'T:0.PRE-T:1.PRE', ['T:0.PRE', 'T:1.PRE', 'T:0.CTL, and Length 6']),
     (SLC, 'HSC:0.ACC-HSC:1', ['HSC:0.ACC', 'HSC:1.ACC']),
     (SLC, 'ST9:0-4', ['ST9:0', 'ST9:1', 'ST9:2', '...', 'ST9:4']),
