@@ -81,7 +81,7 @@ def _print_aside(text: str, end: str = '\n') -> None:
     try:
         print(text, end=end, file=sys.stderr, flush=True)
     except OSError:
-        drop(sys.stderr.fileno())
+        drop_output(sys.stderr)
 
 
 def is_wanted(question: str) -> bool:
@@ -176,9 +176,9 @@ def ignore_further() -> None:
         signal.signal(number, lambda number, frame: None)
 
 
-def drop_output() -> None:
-    """Drop all further output, after its reader has left or a write failed."""
-    drop(sys.stdout.fileno())
+def drop_output(stream: TextIO | None = None) -> None:
+    """Drop all further standard output, or ``stream``: its reader has left, or a write failed."""
+    drop((stream or sys.stdout).fileno())
 
 
 def has_reader_left(error: OSError, tell: Callable[[str], None]) -> bool:

@@ -225,15 +225,17 @@ def test_link_that_does_not_take_the_files_is_the_end(
     assert '[abdf1]: ends: the link does not accept the new files' in capfd.readouterr().err
 
 
-@pytest.mark.parametrize('step', ['tell_plcs', 'LinkThread.exchange'])
+@pytest.mark.parametrize('step', ['tell_plcs', 'BridgeSession', 'LinkThread.exchange'])
 def test_signal_that_comes_during_a_reload_is_no_failure(
         bench: Bench, step: str, monkeypatch: pytest.MonkeyPatch) -> None:
     place = bench.map.with_name('place')
     write_csv(bench.net, 'Baud,Timeout,Share', [f'115200,100,pty:{place}'])
     assert bench.reload()[0]
-    monkeypatch.setattr(f'abdf1_ros.ros.bridge.node.{step}',
-                        lambda *_, **__: bench.node.begin_end())
-    assert bench.reload() == (False, 'this node ends')
+    monkeypatch.setattr(f'abdf1_ros.ros.bridge.node.{step}', lambda *made, **_: (
+        bench.node.begin_end(), step == 'BridgeSession' and BridgeSession(*made))[1])
+    is_done, text = bench.reload()
+    assert (is_done, text != 'this node ends') == (step == 'BridgeSession',) * 2
+    assert bench.node.session.driver.interlocks.is_ending
     monkeypatch.undo()
     bench.end()
     assert not (place.is_symlink() or bench.node.has_failed)

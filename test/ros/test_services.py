@@ -347,11 +347,11 @@ def test_services_of_rows_that_are_gone_close_once_when_no_call_waits() -> None:
     assert woken == ['link', [False, False, False, True]]
     assert [*node.messages[1].values()] == [1, 2, None]
     assert ended(puts[2]) == (True, 'l0: stands in the PLC; l1: stands in the PLC')
-    line = node.network
-    longest = 2.0 + line.line_mode.longest_transaction(line.line, 0.0, stations=1)
-    services.look(begun + 2 * longest - 0.001)
+    longest = 2 * (2.0 + node.network.line_mode.longest_transaction(
+        node.network.line, 0.0, stations=1))
+    services.look(begun + longest - 0.001)
     assert len(woken) == 2
-    services.look(line_time() + 2 * longest)
+    services.look(line_time() + longest)
     assert ended(puts[0]) == (False, 'unknown whether written: no result has come')
     assert ended(puts[1]) == (False, 'l0: stands in the PLC')
     *crowd, late = (node.made['~/read_now/n2'](Trigger.Request(), Trigger.Response())
