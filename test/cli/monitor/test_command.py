@@ -222,7 +222,8 @@ def test_what_counts_is_on_a_screen_of_80_by_24(simulator: Process) -> None:
     with terminal('--node', NODE, term='vt220', size=(24, 80)) as shown:
         end = time.monotonic() + PATIENCE
         while not ('any age' in '\n'.join(screen.display) and '▁▁' in '\n'.join(screen.display)
-                   and screen.display[1].startswith('  load ')):  # diagnostics come later
+                   and screen.display[1].startswith('  load ')  # diagnostics come later
+                   and all(line.strip() for line in screen.display)):  # the picture is whole
             assert time.monotonic() < end, screen.display
             stream.feed(shown.new())
         told = [line.rstrip() for line in screen.display]
