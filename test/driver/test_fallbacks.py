@@ -877,6 +877,10 @@ def test_rule_12_fallback_of_a_serve_row_goes_into_our_own_table(ours: int, thei
         cell.publish(row, 3, run=0.01)
     cell.bench.driver.interlocks.forget_served()
     assert words(served) + words(plain) + words(other) == b'\7\0\0\0\x08\0'
+    cell.publish(other, 3, run=0.01)
+    cell.bench.driver.interlocks.wind_down()
+    cell.bench.line.wake(cell.bench.driver.machine)
+    assert words(other) == b'\x08\0'  # at the end at once
 
 
 def test_rule_17_fallback_has_one_result_and_its_retries_have_none() -> None:
