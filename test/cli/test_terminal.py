@@ -25,27 +25,6 @@ import sys
 from unittest.mock import Mock
 
 from abdf1_ros.cli import terminal
-from abdf1_ros.cli.terminal import (
-    called,
-    colour,
-    command_parser,
-    interruptible,
-    is_port,
-    is_terminal,
-    is_wanted,
-    may_replace,
-    NoPort,
-    number_option,
-    prepare_output,
-    Progress,
-    reason_of,
-    RED,
-    run_command,
-    seconds_option,
-    table,
-    tell,
-    whole_option,
-)
 from abdf1_ros.errors import PortLost
 from abdf1_ros.problems import ConfigurationError, Problem
 import pytest
@@ -72,47 +51,47 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
 
 
 def test_colour_is_for_terminals_that_want_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert colour('bad', RED, Screen()) == '\x1b[31mbad\x1b[0m'
-    assert colour('bad', RED, io.StringIO()) == 'bad'
+    assert terminal.colour('bad', terminal.RED, Screen()) == '\x1b[31mbad\x1b[0m'
+    assert terminal.colour('bad', terminal.RED, io.StringIO()) == 'bad'
     monkeypatch.setenv('NO_COLOR', '')
-    assert colour('bad', RED, Screen()) == 'bad'
-    assert is_terminal(Screen())
+    assert terminal.colour('bad', terminal.RED, Screen()) == 'bad'
+    assert terminal.is_terminal(Screen())
     monkeypatch.setenv('TERM', 'dumb')
-    assert not is_terminal(Screen())
+    assert not terminal.is_terminal(Screen())
 
 
 def test_question_without_a_terminal_is_only_told_and_text_has_its_colour(
         monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setattr('sys.stdin', io.StringIO('y\n'))
     monkeypatch.setattr('sys.stderr', Screen())
-    assert not is_wanted('set it')
-    tell('tool', 'text')
-    tell('tool', 'bad', RED)
+    assert not terminal.is_wanted('set it')
+    terminal.tell('tool', 'text')
+    terminal.tell('tool', 'bad', terminal.RED)
     assert (capsys.readouterr().out, sys.stderr.getvalue()) == (
         'would set it\n', 'tool: text\n\x1b[31mtool: bad\x1b[0m\n')
     for text, wanted in (('y\n', True), (' YES\n', True), ('yet\n', False), ('', False)):
         monkeypatch.setattr('sys.stdin', Screen(text))
-        assert is_wanted('set it') is wanted
+        assert terminal.is_wanted('set it') is wanted
 
 
 def test_empty_file_may_be_replaced(tmp_path: Path) -> None:
     (tmp_path / 'new').touch()
     for path in (tmp_path / 'new', tmp_path):  # a folder is refused later
-        assert may_replace(str(path), lambda place: False)
-    assert not may_replace(__file__, lambda place: False)
-    assert not may_replace(__file__, Mock(side_effect=PermissionError))
+        assert terminal.may_replace(str(path), lambda place: False)
+    assert not terminal.may_replace(__file__, lambda place: False)
+    assert not terminal.may_replace(__file__, Mock(side_effect=PermissionError))
 
 
 def test_file_with_the_name_of_a_port_is_a_file(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path('ttyS1.cap').touch()
-    assert [*map(is_port, ('ttyS1.cap', 'ttyS1', 'ttyS2.cap', 'tcp://x'))] == [
+    assert [*map(terminal.is_port, ('ttyS1.cap', 'ttyS1', 'ttyS2.cap', 'tcp://x'))] == [
         False, True, True, True]
 
 
 def test_columns_of_a_table_are_aligned() -> None:
-    assert table(('name', 'n'), [('a', '10'), ('long name', '5')], right=(1,)) == (
+    assert terminal.table(('name', 'n'), [('a', '10'), ('long name', '5')], right=(1,)) == (
         'name        n\n'
         'a          10\n'
         'long name   5')
@@ -122,7 +101,7 @@ def test_progress_on_a_terminal_is_one_line(monkeypatch: pytest.MonkeyPatch,
                                             clock: list[float]) -> None:
     screen = Screen()
     monkeypatch.setattr('sys.stderr', screen)
-    progress = Progress()
+    progress = terminal.Progress()
     progress.show('1 of 9')
     progress.clear()
     assert screen.getvalue() == ''  # what takes no time needs none
@@ -138,7 +117,7 @@ def test_progress_elsewhere_comes_every_two_seconds(monkeypatch: pytest.MonkeyPa
                                                     clock: list[float]) -> None:
     file = io.StringIO()
     monkeypatch.setattr('sys.stderr', file)
-    progress = Progress()
+    progress = terminal.Progress()
     for tenth in (*range(45), *range(85, 111)):
         clock[0] = 100 + tenth / 10
         progress.show(f'{tenth}')
@@ -147,16 +126,16 @@ def test_progress_elsewhere_comes_every_two_seconds(monkeypatch: pytest.MonkeyPa
 
 
 @pytest.mark.parametrize('say', [
-    lambda progress: progress.show('2 of 9'), lambda progress: tell('tool', 'text')])
+    lambda progress: progress.show('2 of 9'), lambda progress: terminal.tell('tool', 'text')])
 def test_messages_without_room_or_reader_do_not_end_the_work(
-        say: Callable[[Progress], None], monkeypatch: pytest.MonkeyPatch,
+        say: Callable[[terminal.Progress], None], monkeypatch: pytest.MonkeyPatch,
         clock: list[float]) -> None:
     reader, writer = os.pipe()
     os.close(reader)
     for place in ('/dev/full', writer):
         with open(place, 'w', encoding='utf-8') as stderr:  # its close would raise what is left
             monkeypatch.setattr('sys.stderr', stderr)
-            progress = Progress()
+            progress = terminal.Progress()
             clock[0] += 2.5
             say(progress)
 
@@ -164,17 +143,17 @@ def test_messages_without_room_or_reader_do_not_end_the_work(
 def test_output_that_is_closed_takes_all(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr('sys.stdout', None)
     monkeypatch.setattr('sys.stderr', None)
-    prepare_output()
+    terminal.prepare_output()
     for stream in (sys.stdout, sys.stderr):
         print('text', file=stream, flush=True)
-        assert not is_terminal(stream)
+        assert not terminal.is_terminal(stream)
         stream.close()
 
 
 def test_output_that_knows_few_characters_shows_escapes(monkeypatch: pytest.MonkeyPatch) -> None:
     raw = io.BytesIO()
     monkeypatch.setattr('sys.stdout', io.TextIOWrapper(raw, encoding='ascii'))
-    prepare_output()
+    terminal.prepare_output()
     print('h\xe9llo', flush=True)
     assert raw.getvalue() == b'h\\xe9llo\n'
 
@@ -198,7 +177,7 @@ def _interrupts(number: signal.Signals) -> bool:
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.usefixtures('handlers')
 def test_only_the_first_signal_interrupts(number: signal.Signals) -> None:
-    with interruptible():
+    with terminal.interruptible():
         assert _interrupts(number)
         assert not _interrupts(number)
         assert not _interrupts(signal.SIGINT)
@@ -207,7 +186,7 @@ def test_only_the_first_signal_interrupts(number: signal.Signals) -> None:
 
 @pytest.mark.usefixtures('handlers')
 def test_no_signal_interrupts_what_comes_after_the_block() -> None:
-    with interruptible():
+    with terminal.interruptible():
         pass
     assert not _interrupts(signal.SIGINT)
     assert not _interrupts(signal.SIGTERM)
@@ -218,7 +197,7 @@ def test_no_signal_interrupts_what_comes_after_the_block() -> None:
     (None, 3, ''), (KeyboardInterrupt(), 130, ''),
     (ConfigurationError([Problem('a.csv', 'is wrong'), Problem('b.csv', 'too')]), 2,
      'tool: a.csv: is wrong\ntool: b.csv: too\n'),
-    (NoPort('/tmp/x', OSError(2, 'No such file')), 1, 'tool: /tmp/x: No such file\n'),
+    (terminal.NoPort('/tmp/x', OSError(2, 'No such file')), 1, 'tool: /tmp/x: No such file\n'),
     (PortLost('the cable is gone'), 1, 'tool: port lost: the cable is gone\n'),
     (BrokenPipeError(), 7, ''),
     (OSError(28, 'No space left on device'), 2, 'tool: cannot print: No space left on device\n'),
@@ -234,17 +213,18 @@ def test_end_of_a_command_is_told_and_is_its_status(
     dropped, flushed = [], []
     monkeypatch.setattr(terminal, 'drop_output', lambda: dropped.append(True))
     monkeypatch.setattr(sys.stdout, 'flush', lambda: flushed.append(True))
-    assert run_command('tool', work, interrupted=130, unread=7) == status
+    assert terminal.run_command('tool', work, interrupted=130, unread=7) == status
     assert bool(flushed) is (end is None)  # or a full disk would not be told
     assert capsys.readouterr().err == told
     assert bool(dropped) is (type(end) in (OSError, BrokenPipeError))
 
 
 @for_all(('option', 'good', 'bad', 'right'), [
-    (seconds_option, ['0.5'], ['0', '-1', 'nan', 'inf', 'soon', '1_0', '\u0661'],
+    (terminal.seconds_option, ['0.5'], ['0', '-1', 'nan', 'inf', 'soon', '1_0', '\u0661'],
      'a number of seconds above 0'),
-    (whole_option, ['9600'], ['', '96.5', '9_600', '\u0661', '9' * 5000], 'a whole number'),
-    (number_option('0 to 60', 0, 60), ['0', '60'], ['-0.1', '60.1'], '0 to 60')])
+    (terminal.whole_option, ['9600'], ['', '96.5', '9_600', '\u0661', '9' * 5000],
+     'a whole number'),
+    (terminal.number_option('0 to 60', 0, 60), ['0', '60'], ['-0.1', '60.1'], '0 to 60')])
 def test_number_of_an_option(option: Callable[[str], float], good: list[str], bad: list[str],
                              right: str) -> None:
     assert [option(text) for text in good] == [float(text) for text in good]
@@ -257,15 +237,15 @@ def test_number_of_an_option(option: Callable[[str], float], good: list[str], ba
     (OSError(2, 'No such file'), '/tmp/x: No such file'), (OSError('taken'), '/tmp/x: taken'),
     (OSError(2, 'could not open port /tmp/x: gone'), 'could not open port /tmp/x: gone')])
 def test_reason_has_the_name_once(error: OSError, text: str) -> None:
-    assert reason_of('/tmp/x', error) == text
+    assert terminal.reason_of('/tmp/x', error) == text
 
 
 @pytest.mark.parametrize(('number', 'text'), [
     (errno.EACCES, 'usermod -aG dialout'), (errno.ENOENT, 'plc ports')])
 def test_port_that_cannot_be_opened_leads_to_the_cure(number: int, text: str) -> None:
     error = OSError(number, os.strerror(number))
-    assert text in reason_of('/dev/ttyUSB0', error)
-    assert text not in reason_of('net.csv', error)
+    assert text in terminal.reason_of('/dev/ttyUSB0', error)
+    assert text not in terminal.reason_of('net.csv', error)
 
 
 @pytest.mark.parametrize(('given', 'meant'), [
@@ -279,7 +259,7 @@ def test_port_that_cannot_be_opened_leads_to_the_cure(number: int, text: str) ->
     (['ttyS0'], 'ttyS0; did you mean --port ttyS0?')])
 def test_option_that_may_be_meant(
         given: list[str], meant: str, capsys: pytest.CaptureFixture[str]) -> None:
-    parser = command_parser('tool', None)
+    parser = terminal.command_parser('tool', None)
     read = parser.add_subparsers().add_parser('read', allow_abbrev=False)
     for name in ('station', 'port', 'parity', 'baud'):
         read.add_argument(f'--{name}')
@@ -300,7 +280,7 @@ def test_option_that_may_be_meant(
 def test_words_that_are_too_many_are_told_where_they_belong(
         nargs: str, name: str, given: list[str], hint: str,
         capsys: pytest.CaptureFixture[str]) -> None:
-    parser = command_parser('tool', None)
+    parser = terminal.command_parser('tool', None)
     parser.add_argument(name.lower(), metavar=name, nargs=nargs)
     parser.add_argument('--net')
     with pytest.raises(SystemExit):
@@ -309,7 +289,7 @@ def test_words_that_are_too_many_are_told_where_they_belong(
 
 
 def test_number_with_an_exponent_and_a_sign_is_no_option() -> None:
-    parser = command_parser('tool', None)
+    parser = terminal.command_parser('tool', None)
     parser.add_argument('values', nargs='+')
     assert parser.parse_args(['-1.5e3', '-2', '-.5', '-1E-3']).values == [
         '-1.5e3', '-2', '-.5', '-1E-3']
@@ -327,16 +307,16 @@ def test_commands_are_told_as_they_can_be_pasted(
     monkeypatch.setattr(sys, 'executable', str(venv / 'python'))
     monkeypatch.setenv('PATH', '/nowhere')
     monkeypatch.delenv('AMENT_PREFIX_PATH', raising=False)
-    assert called('plc') == f"'{venv}/plc'"
-    assert called('node') == f"'{venv}/python' -m abdf1_ros node"
+    assert terminal.called('plc') == f"'{venv}/plc'"
+    assert terminal.called('node') == f"'{venv}/python' -m abdf1_ros node"
     (venv / 'abdf1').write_text('from abdf1_ros', encoding='utf-8')
     (venv / 'abdf1').chmod(0o755)
-    assert called('node') == f"'{venv}/abdf1' node"
+    assert terminal.called('node') == f"'{venv}/abdf1' node"
     monkeypatch.setenv('PATH', f'{venv}:{tmp_path}/ros')
-    assert called('plc') == 'plc'
-    assert called('node') == 'abdf1 node'
+    assert terminal.called('plc') == 'plc'
+    assert terminal.called('node') == 'abdf1 node'
     monkeypatch.setenv('AMENT_PREFIX_PATH', f'/nowhere:{workspace}')
-    assert called('plc') == 'ros2 run abdf1_ros plc'
-    assert called('check') == 'abdf1 check'
+    assert terminal.called('plc') == 'ros2 run abdf1_ros plc'
+    assert terminal.called('check') == 'abdf1 check'
     monkeypatch.setenv('PATH', str(venv))  # without ros2
-    assert called('plc') == 'plc'
+    assert terminal.called('plc') == 'plc'

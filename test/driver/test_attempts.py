@@ -27,27 +27,15 @@ from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.settings.heartbeats import Fallback
 from abdf1_ros.settings.mapping import Mapping
 import pytest
+from support import interlocks
 from support.driver_bench import ListeningBench, store
-from support.interlocks import (
-    beat_row,
-    Cell,
-    END,
-    end,
-    GuestCell,
-    RETURN,
-    speed_cell,
-    speed_row,
-    START,
-    TIMEOUT,
-    WORDS,
-)
 from support.mappings import make_mapping
 
 OLD = 888  # a command of before
 READ = make_mapping('N7:0', length=4, period=100)
 
 
-def say(cell: Cell, row: Mapping, values: Sequence[float], published: float) -> None:
+def say(cell: interlocks.Cell, row: Mapping, values: Sequence[float], published: float) -> None:
     """Hand a message over that was published then."""
     cell.bench.driver.write([row], values, published)
     cell.bench.line.wake(cell.bench.driver.machine)
@@ -55,7 +43,7 @@ def say(cell: Cell, row: Mapping, values: Sequence[float], published: float) -> 
 
 @pytest.mark.parametrize('age', [0.6, None])  # s; None: one message, again and again
 def test_rule_7_old_messages_keep_no_output_alive(age: float | None) -> None:
-    cell, speed = speed_cell()
+    cell, speed = interlocks.speed_cell()
     cell.publish(speed, 3, run=0.1)
     died = cell.now
     for number in range(200):
@@ -65,11 +53,11 @@ def test_rule_7_old_messages_keep_no_output_alive(age: float | None) -> None:
     assert cell.word('N7:0') == 7
     cell.run(1.5)
     assert cell.written('N7:0', died + 0.8) == []
-    assert cell.results().count(TIMEOUT) == 1
+    assert cell.results().count(interlocks.TIMEOUT) == 1
 
 
 def test_rule_8_guest_who_writes_over_a_fallback_all_the_time_moves_nothing_for_long() -> None:
-    cell = GuestCell(beat_row(), speed_row(), run=2.0)
+    cell = interlocks.GuestCell(interlocks.beat_row(), interlocks.speed_row(), run=2.0)
     begun, seen = cell.now, list[tuple[int, int]]()
     for number in range(100):
         cell.bench.at(begun + number / 20, lambda: cell.ask('N7:0', OLD))
@@ -88,16 +76,16 @@ def test_rule_8_guest_who_writes_over_a_fallback_all_the_time_moves_nothing_for_
 
 
 def test_rules_5_and_8_port_given_away_and_taken_ten_times_has_its_fallback_each_time() -> None:
-    cell, speed = speed_cell()
+    cell, speed = interlocks.speed_cell()
     for _ in range(10):
-        end(cell)
+        interlocks.end(cell)
         store(cell.plc, 'N7:0', [OLD])  # as the program that has the port does
         cell.bench.driver.interlocks.resume()
         cell.bench.open(run=0.3)
         assert cell.word('N7:0') == 7
         cell.bench.write(speed, [3], run=0.1)
         assert cell.word('N7:0') == 3
-    assert {*cell.results()} <= {START, RETURN, END, 'written'}
+    assert {*cell.results()} <= {interlocks.START, interlocks.RETURN, interlocks.END, 'written'}
     words = cell.bench.driver.interlocks.fallbacks[0].words
     words.may_land((), cell.now + 60.0)
     words.plan_again(cell.now)
@@ -105,8 +93,8 @@ def test_rules_5_and_8_port_given_away_and_taken_ten_times_has_its_fallback_each
 
 
 def test_rule_3d_messages_of_the_wrong_length_keep_no_heartbeat_alive() -> None:
-    speed = speed_row(fallback=None)
-    cell = Cell(beat_row(requires=('speed',), timeout=300), speed)
+    speed = interlocks.speed_row(fallback=None)
+    cell = interlocks.Cell(interlocks.beat_row(requires=('speed',), timeout=300), speed)
     cell.publish(speed, 3, times=20, run=2.0)
     assert cell.word('N10:0') > 0
     for number in range(20):
@@ -118,20 +106,20 @@ def test_rule_3d_messages_of_the_wrong_length_keep_no_heartbeat_alive() -> None:
 
 
 def test_rule_8_port_that_is_away_for_longer_than_fallback_after_brings_the_fallback() -> None:
-    speed = speed_row(Fallback((7,), 60_000))
-    cell = Cell(speed, run=1.0)
+    speed = interlocks.speed_row(Fallback((7,), 60_000))
+    cell = interlocks.Cell(speed, run=1.0)
     cell.publish(speed, 3, run=0.5)
     cell.bench.lose_port()
     cell.run(61.0)
     assert cell.word('N7:0') == 3
     cell.bench.open(run=0.2)
     assert cell.word('N7:0') == 7
-    assert cell.results()[-1] == RETURN
+    assert cell.results()[-1] == interlocks.RETURN
 
 
 @pytest.mark.parametrize('silent', [1.0, 0.05])  # s; in the second no read misses the PLC
 def test_rule_8_another_plc_with_an_old_command_has_the_fallback(silent: float) -> None:
-    cell = Cell(speed_row(), make_mapping('N11:0', period=200), run=1.0)
+    cell = interlocks.Cell(interlocks.speed_row(), make_mapping('N11:0', period=200), run=1.0)
     cell.plc.faults.silent = True
     cell.run(silent)
     store(cell.plc, 'N7:0', [OLD])
@@ -141,7 +129,8 @@ def test_rule_8_another_plc_with_an_old_command_has_the_fallback(silent: float) 
 
 
 def test_rule_10_fallback_whose_packets_are_refused_in_turn_arrives_whole() -> None:
-    cell = Cell(speed_row(Fallback((7,) * 200, 500), length=200), start=False)
+    row = interlocks.speed_row(Fallback((7,) * 200, 500), length=200)
+    cell = interlocks.Cell(row, start=False)
     serve, count = cell.plc.serve, [0]
 
     def refuse_each_third(command: Packet) -> Packet:
@@ -160,11 +149,11 @@ def test_rule_10_fallback_whose_packets_are_refused_in_turn_arrives_whole() -> N
 
 def test_rule_27_value_that_stood_before_new_files_stands_no_more() -> None:
     row = make_mapping('N7:0', 'Write', write_again=60_000, fallback=Fallback((7,), 60_000))
-    cell = Cell(row, READ, run=1.0)
+    cell = interlocks.Cell(row, READ, run=1.0)
     for _ in range(2):
         cell.publish(row, 3, run=0.3)
     assert cell.bench.listener.outcomes()[-1] is Outcome.STANDS
-    end(cell)
+    interlocks.end(cell)
     assert cell.word('N7:0') == 7
     store(cell.plc, 'N7:0', [3])  # as a download does
     cell.bench.restart()
@@ -176,7 +165,7 @@ def test_rule_27_value_that_stood_before_new_files_stands_no_more() -> None:
 
 def test_bridge_that_only_listens_sends_nothing_whatever_its_rows_ask_for() -> None:
     """The map may not have such rows in Mode Listen; see test/plan/test_usable_rows.py."""
-    beat, speed = beat_row(), speed_row()
+    beat, speed = interlocks.beat_row(), interlocks.speed_row()
     bench = ListeningBench([beat, speed, READ])  # it looks at what is sent all the time
     for number in range(20):
         bench.driver.interlocks.executor_ran(bench.now)
@@ -189,8 +178,8 @@ def test_bridge_that_only_listens_sends_nothing_whatever_its_rows_ask_for() -> N
 
 
 def test_rule_5_calls_at_the_end_move_nothing_and_each_has_its_answer() -> None:
-    speed, asked = speed_row(), make_mapping('N11:0', tag='asked', period=60_000)
-    cell = Cell(beat_row(), speed, asked, run=2.0)
+    speed, asked = interlocks.speed_row(), make_mapping('N11:0', tag='asked', period=60_000)
+    cell = interlocks.Cell(interlocks.beat_row(), speed, asked, run=2.0)
     answers: list[ReadAnswer] = []
 
     def call() -> None:
@@ -202,16 +191,16 @@ def test_rule_5_calls_at_the_end_move_nothing_and_each_has_its_answer() -> None:
         cell.bench.at(cell.now + number / 200, call)
     cell.run(0.5)
     assert cell.word('N7:0') == 3
-    end(cell, 0.2)
-    assert [cell.word(name) for name in WORDS] == [7, 0]
+    interlocks.end(cell, 0.2)
+    assert [cell.word(name) for name in interlocks.WORDS] == [7, 0]
     results = cell.results()[before:]
     assert len(answers) == 400
-    assert len(results) - results.count(END) == 400
+    assert len(results) - results.count(interlocks.END) == 400
 
 
 def test_rule_27_value_of_before_another_bridge_had_the_line_stands_no_more() -> None:
     row = make_mapping('N7:0', 'Write', write_again=60_000)
-    cell = Cell(row, READ, run=1.0)
+    cell = interlocks.Cell(row, READ, run=1.0)
     for _ in range(2):
         cell.publish(row, 3, run=0.3)
     cell.bench.write(row, [4])
@@ -227,8 +216,8 @@ def test_rule_27_value_of_before_another_bridge_had_the_line_stands_no_more() ->
 
 
 def test_rule_8_changes_that_give_way_and_a_guest_keep_no_fallback_from_its_bit() -> None:
-    bit = speed_row(Fallback((0,), 1000), address='B3:0/0')
-    cell = GuestCell(bit, polling='Standard')
+    bit = interlocks.speed_row(Fallback((0,), 1000), address='B3:0/0')
+    cell = interlocks.GuestCell(bit, polling='Standard')
     begun = cell.now
     for number in range(400):  # more than the line carries
         cell.bench.at(begun + number / 100, lambda number=number: cell.bench.write(  # type: ignore
@@ -242,4 +231,4 @@ def test_rule_8_changes_that_give_way_and_a_guest_keep_no_fallback_from_its_bit(
     cell.ask('B3:0', 0xFF)
     cell.run(0.5)
     assert cell.word('B3:0') == 0xFE
-    assert len(cell.results()) == 400 + cell.results().count(TIMEOUT) + 1
+    assert len(cell.results()) == 400 + cell.results().count(interlocks.TIMEOUT) + 1

@@ -28,39 +28,30 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import LinkError
 import pytest
 from std_msgs.msg import Int16MultiArray
+from support import fault_rig
 from support.device_server import QueueingServer
 from support.fault_box import FaultBox
-from support.fault_rig import (
-    boxed,
-    HeardNode,
-    is_unanswered,
-    NOT_SENT,
-    Renewed,
-    Rig,
-    SETPOINT,
-    UNKNOWN,
-)
 from support.ros import ERROR, Observer, Process, ros_args, write_csv
 
 TOO_LATE = 'not written: refused: it came '  # from a process that a busy host let stand still
 
 US, OTHER_MASTER = 5, 6
 
-Boxed = tuple[Rig, FaultBox]
+Boxed = tuple[fault_rig.Rig, FaultBox]
 
 
 @pytest.fixture(scope='module')
 def shared(observer: Observer, tmp_path_factory: pytest.TempPathFactory
-           ) -> Iterator[Renewed[Boxed]]:
+           ) -> Iterator[fault_rig.Renewed[Boxed]]:
     names = count(1)
-    renewed = Renewed(lambda: boxed(
+    renewed = fault_rig.Renewed(lambda: fault_rig.boxed(
         observer, tmp_path_factory.mktemp('line'), name=f'shared_{next(names)}'))
     yield renewed
     renewed.close()
 
 
 @pytest.fixture
-def line(shared: Renewed[Boxed], request: pytest.FixtureRequest) -> Iterator[Boxed]:
+def line(shared: fault_rig.Renewed[Boxed], request: pytest.FixtureRequest) -> Iterator[Boxed]:
     """Return a rig that is well, with its box."""
     with shared.lent(request) as (rig, box):
         box.mend()
@@ -92,11 +83,11 @@ def test_second_master_on_the_line(line: Boxed) -> None:
     box.overhear = talk
     rig.told('[ERROR]', '2510 ERR_WRONG_MESSAGE')  # the first of this line, or it is not logged
     results = [rig.write(3.0 + number) for number in range(5)]
-    assert all(text == 'written' or text.startswith((UNKNOWN, NOT_SENT, TOO_LATE))
-               for text in results)
+    assert all(text == 'written' or text.startswith(
+        (fault_rig.UNKNOWN, fault_rig.NOT_SENT, TOO_LATE)) for text in results)
     rig.observer.until(lambda: len(said) > 100, 'more traffic')
     assert 'unusable reply' not in rig.said  # no reply of others was taken for ours
-    assert rig.has_read_only(SETPOINT, 3.0, 4.0, 5.0, 6.0, 7.0)
+    assert rig.has_read_only(fault_rig.SETPOINT, 3.0, 4.0, 5.0, 6.0, 7.0)
     box.overhear = lambda data: b''
     rig.recovers()  # after two late replies in a row a station is tried less often
 
@@ -115,12 +106,12 @@ def test_plc_loses_power_in_the_middle_of_a_write(line: Boxed) -> None:
 
     box.overhear = cut
     result = rig.write(3.0)
-    assert result.startswith(UNKNOWN) and is_unanswered(result)
+    assert result.startswith(fault_rig.UNKNOWN) and fault_rig.is_unanswered(result)
     box.overhear = lambda data: b''
     rig.status('link', ERROR, 'port open, but none of 2 stations answers')
     rig.restart_simulator()
     rig.recovers()
-    assert rig.has_read_only(SETPOINT)  # it is not written again
+    assert rig.has_read_only(fault_rig.SETPOINT)  # it is not written again
 
 
 _TIMES = {'timeout': 0.1, 'cmd_timeout': 0.2, 'retries': 0}
@@ -140,7 +131,7 @@ def test_message_to_a_bridge_that_waits_never_reaches_the_line(
     rows = write_csv(tmp_path / 'map.csv', 'Tag,Command,Address,Station,PLC_Type,Period',
                      ['order,ReadWrite,N7:0,1,SLC,200'])
     with Observer() as observer:
-        bridge = HeardNode(observer, 'abdf1', server.url, 'order', order=Int16MultiArray)
+        bridge = fault_rig.HeardNode(observer, 'abdf1', server.url, 'order', order=Int16MultiArray)
         with Process('node', *ros_args(f'net_file:={net}', f'map_file:={rows}')):
             for number in range(100, 115):
                 bridge.publish(number)
@@ -148,7 +139,7 @@ def test_message_to_a_bridge_that_waits_never_reaches_the_line(
             assert server.stored
             observer.until(lambda: len(bridge.results) == 15, 'all results')
             assert {result.message for result in bridge.results} == {
-                NOT_SENT + 'nothing has been heard on this connection'}
+                fault_rig.NOT_SENT + 'nothing has been heard on this connection'}
             server.take_over()
             bridge.until_well()
             assert server.written() == []

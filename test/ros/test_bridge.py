@@ -27,19 +27,7 @@ import pytest
 from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile
 from std_msgs.msg import String, UInt8MultiArray, UInt16MultiArray  # noqa: I101
 from std_srvs.srv import Trigger
-from support.ros import (
-    details,
-    ERROR,
-    find_status,
-    Inbox,
-    Observer,
-    OK,
-    Process,
-    until_status,
-    values_in,
-    WARN,
-    write_csv,
-)
+from support import ros
 from support.simulator_process import make_files, NET_HEADER, READS, WRITES
 from support.vectors import load_tables
 
@@ -53,10 +41,10 @@ def _kind(tag: str) -> Any:
 class Bridge:
     """A node that runs against a simulator, and what it says of itself."""
 
-    simulator: Process
-    node: Process
+    simulator: ros.Process
+    node: ros.Process
 
-    def __init__(self, port: Path, observer: Observer) -> None:
+    def __init__(self, port: Path, observer: ros.Observer) -> None:
         self.port = port
         self.observer = observer
         self.diagnostics = observer.diagnostics(port)
@@ -69,7 +57,7 @@ class Bridge:
         for tag in WRITES:
             self._publishers[tag] = self.observer.publisher(_kind(tag), f'/abdf1/write/{tag}')
 
-    def listen(self, tag: str, qos: QoSProfile | None = None) -> Inbox:
+    def listen(self, tag: str, qos: QoSProfile | None = None) -> ros.Inbox:
         return self.observer.listen(READS[tag][0], f'/abdf1/read/{tag}', qos)
 
     @contextmanager
@@ -98,13 +86,13 @@ class Bridge:
 def bridge(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bridge]:
     files = make_files(tmp_path_factory.mktemp('bridge'))
     # On a busy host a process may stand still: no station is lost by it, and no write too old.
-    write_csv(files.net, NET_HEADER, ['2,2,1000,115200,300'])
+    ros.write_csv(files.net, NET_HEADER, ['2,2,1000,115200,300'])
     arguments = files.args('net.com_port:=2', 'diagnostics_period:=0.25', 'write_timeout:=4.0',
                            'processor_period:=0.3')
-    with Observer() as observer:
+    with ros.Observer() as observer:
         bridge = Bridge(files.port, observer)
         with files.start_simulator() as bridge.simulator, \
-                Process('node', *arguments) as bridge.node:
+                ros.Process('node', *arguments) as bridge.node:
             bridge.open_publishers()
             bridge.diagnostics.until_fresh()
             yield bridge
@@ -119,7 +107,7 @@ def test_late_subscriber_gets_the_value_with_its_type_and_layout(bridge: Bridge)
     for tag, inbox in {tag: bridge.listen(tag) for tag in READS}.items():
         kind, label, values = READS[tag]
         message = inbox.first()
-        assert values_in(message) == values, tag
+        assert ros.values_in(message) == values, tag
         if kind is not String:
             (dimension,) = message.layout.dim
             assert message.layout.data_offset == 0
@@ -168,21 +156,22 @@ def test_silent_station_is_seen_by_every_means(bridge: Bridge) -> None:
             'no liveliness')
         # The Active Node Table and the diagnostics tell it to all.
         bridge.active.values([0b010] + 15 * [0])
-        status = until_status(bridge.diagnostics, 'station 2', ERROR)
+        status = ros.until_status(bridge.diagnostics, 'station 2', ros.ERROR)
         assert re.fullmatch(
             r'ERROR: station 2 inactive for \d+\.\d s', status.message), status.message
-        assert details(status)['active'] == 'no'
-        status = until_status(bridge.diagnostics, 'link', WARN)
+        assert ros.details(status)['active'] == 'no'
+        status = ros.until_status(bridge.diagnostics, 'link', ros.WARN)
         assert status.message == 'WARN: port open, 1 of 2 stations do not answer'
-        assert details(status)['diagnostics period'] == '0.25 s'
-        status = until_status(bridge.diagnostics, 'mappings', ERROR,
-                              lambda status: [details(status)[key] for key in (
-                                  'failed', 'late', 'stale')] == ['12', '0', '0'])
+        assert ros.details(status)['diagnostics period'] == '0.25 s'
+        status = ros.until_status(
+            bridge.diagnostics, 'mappings', ros.ERROR, lambda status: [
+                ros.details(status)[key] for key in ('failed', 'late', 'stale')] == [
+                    '12', '0', '0'])
         assert re.fullmatch(
             r'failed: C5:2\.ACC at station 2, last read \d+\.\d s ago; '
             r'2509 ERR_INACTIVE_STATION: Slave Station \(2\) Inactive',
-            details(status)['parts']), status
-        assert 'speeds' not in details(status)
+            ros.details(status)['parts']), status
+        assert 'speeds' not in ros.details(status)
         # A late subscriber gets no dead value, while the other station goes on.
         late = bridge.listen('parts')
         living = bridge.listen('speeds')
@@ -190,9 +179,9 @@ def test_silent_station_is_seen_by_every_means(bridge: Bridge) -> None:
         assert not late
         assert plain.next()
     # Values come back by themselves.
-    assert values_in(late.first()) == [-17]
+    assert ros.values_in(late.first()) == [-17]
     bridge.active.clear()
-    assert values_in(careful.next()) == [-17]
+    assert ros.values_in(careful.next()) == [-17]
     bridge.observer.until(lambda: not careful.liveliness[-1].not_alive_count, 'liveliness again')
     for inbox in (careful, plain, late, living):
         bridge.observer.forget(inbox)
@@ -202,7 +191,7 @@ def test_silent_station_is_seen_by_every_means(bridge: Bridge) -> None:
 
 def test_active_stations_are_latched_and_published_on_change_only(bridge: Bridge) -> None:
     late = bridge.observer.listen(UInt16MultiArray, '/abdf1/active_stations')
-    assert values_in(late.first()) == [0b110] + 15 * [0]
+    assert ros.values_in(late.first()) == [0b110] + 15 * [0]
     with bridge.fault('silent 1', station=1):
         late.values([0b100] + 15 * [0])
     bridge.observer.until(lambda: late[-1].data[0] == 0b110, 'station 1 again')
@@ -228,12 +217,12 @@ def test_what_is_written_is_confirmed_and_comes_back(
         bridge: Bridge, tag: str, values: list[float] | str, shown: str, address: str,
         station: str) -> None:
     inbox = bridge.listen(tag)
-    before = values_in(inbox.first())
+    before = ros.values_in(inbox.first())
     assert before != values
     result = next(result for result in (bridge.write(tag, values) for _ in range(4))
                   if result.message == 'written')  # unknown if the host stood still
-    assert result.level == OK
-    said = details(result)
+    assert result.level == ros.OK
+    said = ros.details(result)
     assert 0 < float(said.pop('latency_ms')) < 5000
     assert int(said.pop('request')) > 0
     assert said == {'address': address, 'station': station, 'value': shown}
@@ -248,7 +237,7 @@ def test_what_is_written_is_confirmed_and_comes_back(
 
 
 def test_all_counters_are_there_by_mnemonic_in_order_and_start_afresh(bridge: Bridge) -> None:
-    before = details(find_status(bridge.diagnostics.fresh(), 'counters'))
+    before = ros.details(ros.find_status(bridge.diagnostics.fresh(), 'counters'))
     assert list(before) == COUNTERS
     assert len(COUNTERS) == 29
     for name in ('CNT_MSG_PACKETS_SENT', 'CNT_CMD_MSGS_SENT', 'CNT_REPLY_MSGS_RCVD',
@@ -256,7 +245,7 @@ def test_all_counters_are_there_by_mnemonic_in_order_and_start_afresh(bridge: Br
                  'CRD_CHAR_RECV'):
         assert int(before[name]) > 0, name
     assert bridge.observer.call(Trigger, '/abdf1/reset_counters', Trigger.Request()).success
-    after = details(find_status(bridge.diagnostics.fresh(), 'counters'))
+    after = ros.details(ros.find_status(bridge.diagnostics.fresh(), 'counters'))
     assert list(after) == COUNTERS
     assert 0 <= int(after['CNT_CMD_MSGS_SENT']) < int(before['CNT_CMD_MSGS_SENT'])
     assert int(after['CRD_CHAR_SENT']) < int(before['CRD_CHAR_SENT'])
@@ -264,8 +253,8 @@ def test_all_counters_are_there_by_mnemonic_in_order_and_start_afresh(bridge: Br
 
 def test_processor_that_runs_no_program_is_a_warning(bridge: Bridge) -> None:
     with bridge.fault('mode 2 program'):
-        status = until_status(
-            bridge.diagnostics, 'station 2', WARN, lambda status: status.message ==
+        status = ros.until_status(
+            bridge.diagnostics, 'station 2', ros.WARN, lambda status: status.message ==
             'WARN: station 2 active, but in program mode (REM PROG)')
-        assert details(status)['processor'] == 'SLC 5/03 series A revision 1, REM PROG'
+        assert ros.details(status)['processor'] == 'SLC 5/03 series A revision 1, REM PROG'
         bridge.simulator.say('mode 2 run')

@@ -34,21 +34,8 @@ import pytest
 from rclpy.clock import ClockType
 from std_msgs.msg import Int16MultiArray
 from std_srvs.srv import SetBool, Trigger
+from support import ros
 from support.commands import Output, running_simulator
-from support.ros import (
-    BridgeCell,
-    details,
-    ERROR,
-    find_status,
-    Inbox,
-    Observer,
-    OK,
-    Process,
-    ros_args,
-    until_status,
-    WARN,
-    write_csv,
-)
 from support.rungs import PageLadder
 
 NET = 'NAK_Retries,ENQ_Retries,Cmd_Timeout,Baud,Timeout\n1,1,500,115200,100\n'
@@ -70,7 +57,7 @@ MARK = b'GUEST'  # what is easily known in a command
 ATTEMPTS = 16  # to be seen by a host that is not busy
 
 
-class Cell(BridgeCell):
+class Cell(ros.BridgeCell):
     """A bridge with a heartbeat."""
 
     def __init__(self, folder: Path, *assignments: str) -> None:
@@ -119,7 +106,7 @@ class ProcessCell(Cell):
 
     def start(self) -> None:
         self.results = self.ros.results()
-        self.process = Process('node', *ros_args(*self.assignments))
+        self.process = ros.Process('node', *ros.ros_args(*self.assignments))
 
     def end(self, number: signal.Signals = signal.SIGTERM) -> int:
         self.process.send(number)
@@ -132,7 +119,7 @@ def cell(tmp_path: Path) -> Iterator[Cell]:
         yield made
 
 
-def fallbacks(results: Inbox) -> list[str]:
+def fallbacks(results: ros.Inbox) -> list[str]:
     """Return the causes of the fallback values that have been told."""
     return [result.message.partition(': ')[2] for result in results
             if result.message.startswith('fallback value written')]
@@ -312,7 +299,7 @@ def test_rule_8_fallback_comes_when_the_publisher_is_gone(cell: Cell) -> None:
         cell.results.clear()
         began, number = time.monotonic(), next(numbers)
         publisher.publish(Int16MultiArray(data=[number]))
-        if cell.results.until(lambda result: details(result)['value'] == f'[{number}]',
+        if cell.results.until(lambda result: ros.details(result)['value'] == f'[{number}]',
                               'its result').message != 'written':
             return False
         cell.until(lambda: cell.word('N10:1') == 7, 'the fallback value')
@@ -331,8 +318,8 @@ def test_rules_13_and_15_guarded_row_is_withheld_and_named(cell: Cell) -> None:
         status for array in cell.diagnostics for status in array.status
         if status.name.endswith(': mappings') and 'withheld' in status.message), None),
         'a withheld row')
-    assert 'withheld' in details(status)['doors']
-    assert 'not in RUN: it is in REM PROG' in details(status)['doors']
+    assert 'withheld' in ros.details(status)['doors']
+    assert 'not in RUN: it is in REM PROG' in ros.details(status)['doors']
     cell.until_beats(10)
     count = len(doors)
     cell.until_beats(10)
@@ -359,25 +346,26 @@ ECHO_MAP = ('Tag,Command,Address,Station,PLC_Type,Period,While,While_Timeout', [
 
 
 def test_rule_21_an_echo_is_no_plc(tmp_path: Path) -> None:
-    net = write_csv(tmp_path / 'net.csv', *ECHO_NET)
-    rows = write_csv(tmp_path / 'map.csv', *ECHO_MAP)
+    net = ros.write_csv(tmp_path / 'net.csv', *ECHO_NET)
+    rows = ros.write_csv(tmp_path / 'map.csv', *ECHO_MAP)
     port = tmp_path / 'line'
     with running_simulator('--pty', str(port), '--echo', '--full-duplex', '1',
-                           '--at', '0 silent 1'), Observer() as observer:
+                           '--at', '0 silent 1'), ros.Observer() as observer:
         diagnostics, results = observer.diagnostics(str(port)), observer.results()
         heard = [observer.listen(Int16MultiArray, f'/abdf1/{topic}') for topic in (
             'read/ours', 'read/doors', 'read/counter', 'read/lamps')]
-        with Process('node', *ros_args(f'net_file:={net}', f'map_file:={rows}',
-                                       f'port:={port}')) as node:
+        with ros.Process('node', *ros.ros_args(f'net_file:={net}', f'map_file:={rows}',
+                                               f'port:={port}')) as node:
             assert f'{port}: {COMES_BACK}' in node.wait_for('[ERROR]', COMES_BACK)
             speed = observer.publisher(Int16MultiArray, '/abdf1/write/speed')
             for value in range(1, 6):
                 speed.publish(Int16MultiArray(data=[value]))
             observer.until(lambda: len(results) >= 5 or None, 'five results')
-            until_status(diagnostics, 'link', ERROR, lambda status: COMES_BACK in status.message)
-            assert 'inactive' in until_status(diagnostics, 'station 1', ERROR).message
-            until_status(diagnostics, 'mappings', ERROR)
-            status = until_status(diagnostics, 'interlocks', WARN)
+            ros.until_status(
+                diagnostics, 'link', ros.ERROR, lambda status: COMES_BACK in status.message)
+            assert 'inactive' in ros.until_status(diagnostics, 'station 1', ros.ERROR).message
+            ros.until_status(diagnostics, 'mappings', ros.ERROR)
+            status = ros.until_status(diagnostics, 'interlocks', ros.WARN)
             assert 'beat: heartbeat does not count' in status.message
             node.end()
     assert [list(inbox) for inbox in heard] == [[], [], [], []]
@@ -393,15 +381,15 @@ def test_rule_22_status_says_whether_ros_is_in_control_and_what_is_missing(cell:
             'ruled,Read,B12:0/2,1,SLC,50,,,,beat']
     cell.map.write_text('\n'.join(rows), encoding='utf-8')
     assert cell.call(Trigger, 'reload', Trigger.Request()).success
-    until_status(cell.diagnostics, 'interlocks', WARN,
-                 lambda status: 'ruled is 0: a person has to press reset' in
-                 details(status)['station 1'])
+    ros.until_status(cell.diagnostics, 'interlocks', ros.WARN,
+                     lambda status: 'ruled is 0: a person has to press reset' in
+                     ros.details(status)['station 1'])
 
     def is_in_control() -> bool:
         ladder.press_reset()  # again after a lapse, as on a busy host
         plc.advance()
-        status = find_status(cell.diagnostics[-1], 'interlocks')
-        return ladder.is_on(Lamp.IN_CONTROL) and status.level == OK and \
-            details(status)['station 1'].startswith('in control for')
+        status = ros.find_status(cell.diagnostics[-1], 'interlocks')
+        return ladder.is_on(Lamp.IN_CONTROL) and status.level == ros.OK and \
+            ros.details(status)['station 1'].startswith('in control for')
 
     cell.until(is_in_control, 'a reset that is accepted, and told')

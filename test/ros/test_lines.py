@@ -41,21 +41,9 @@ from rclpy.node import Node
 from rclpy.utilities import get_default_context
 from std_msgs.msg import Int16MultiArray
 from std_srvs.srv import Trigger
+from support import ros
 from support.commands import Output
 from support.ptys import PATIENCE
-from support.ros import (
-    details,
-    ERROR,
-    EVERYTHING,
-    get_parameters,
-    Observer,
-    OK,
-    stamp,
-    until_status,
-    values_in,
-    WARN,
-    write_csv,
-)
 
 PRESS, PAINT = '/press/press_plc', '/paint/paint_plc'
 
@@ -209,12 +197,12 @@ class Plant:
     def __init__(self, folder: Path, stack: ExitStack, request: EndRequest) -> None:
         self.folder = folder
         self._request = request
-        self.observer = stack.enter_context(Observer())
+        self.observer = stack.enter_context(ros.Observer())
         self.plcs = {}
         self.nodes: dict[str, BridgeNode] = {}
         for name in ('a', 'b', 'c'):
             (folder / name).mkdir()
-            data = write_csv(
+            data = ros.write_csv(
                 folder / name / 'plc.csv', 'Station,PLC_Type,Address,Length,Values',
                 [f'1,PLC5,N7:0,16,7 {ord(name)}'])
             self.plcs[name] = stack.enter_context(Plcs(data))
@@ -226,12 +214,12 @@ class Plant:
 
     def write_net(self, name: str, port: str, share: str = '') -> None:
         """Write the net file of a line."""
-        write_csv(self.folder / f'{name}_net.csv', 'Com_Port,Baud,Timeout,Share',
-                  [f'{port},115200,100,{share}'])
+        ros.write_csv(self.folder / f'{name}_net.csv', 'Com_Port,Baud,Timeout,Share',
+                      [f'{port},115200,100,{share}'])
 
     def write_map(self, name: str, row: str) -> None:
-        write_csv(self.folder / f'{name}_map.csv',
-                  'Tag,Command,Address,Station,PLC_Type,Length', [row])
+        ros.write_csv(self.folder / f'{name}_map.csv',
+                      'Tag,Command,Address,Station,PLC_Type,Length', [row])
 
     def start(self, *arguments: str, reads: str = '') -> None:
         """Run the process; see that these lines read."""
@@ -246,8 +234,8 @@ class Plant:
 
     def speeds(self, name: str) -> list[float] | str:
         """Return the next value of a line."""
-        inbox = self.observer.listen(Int16MultiArray, f'/hall/{name}/read/speed', EVERYTHING)
-        value = values_in(inbox.first())
+        inbox = self.observer.listen(Int16MultiArray, f'/hall/{name}/read/speed', ros.EVERYTHING)
+        value = ros.values_in(inbox.first())
         self.observer.forget(inbox)
         return value
 
@@ -293,7 +281,7 @@ def plant(tmp_path: Path, end_request: EndRequest,
 
 def line_status(plant: Plant, level: bytes) -> dict[str, str]:
     """Wait for the status of all lines; return its values."""
-    return details(until_status(plant.observer.diagnostics(''), 'lines', level))
+    return ros.details(ros.until_status(plant.observer.diagnostics(''), 'lines', level))
 
 
 def test_each_line_is_a_node_of_its_own(plant: Plant, capfd: Output) -> None:
@@ -301,11 +289,11 @@ def test_each_line_is_a_node_of_its_own(plant: Plant, capfd: Output) -> None:
     plant.start('--params-file', second, reads='abc')
     assert f'{second}:1: /hall/b has a section in {plant.folder}/lines.yaml:5 too: it is one ' \
         'line, with the later of two values' in capfd.readouterr().err
-    assert get_parameters(plant.observer, 'net.com_port', 'write_timeout', node='/hall/b') == [
+    assert ros.get_parameters(plant.observer, 'net.com_port', 'write_timeout', node='/hall/b') == [
         plant.plcs['b'].port, 3.5]
     diagnostics = plant.observer.diagnostics(plant.plcs['c'].port)
-    assert until_status(diagnostics, 'link', OK).name == 'hall/c: link'
-    assert line_status(plant, OK) == {'lines': '3', 'running': '3', 'restarts': '0'}
+    assert ros.until_status(diagnostics, 'link', ros.OK).name == 'hall/c: link'
+    assert line_status(plant, ros.OK) == {'lines': '3', 'running': '3', 'restarts': '0'}
     assert plant.observer.call(Trigger, '/hall/a/reload', Trigger.Request()).success
     assert plant.end() == 0
 
@@ -313,7 +301,8 @@ def test_each_line_is_a_node_of_its_own(plant: Plant, capfd: Output) -> None:
 def test_process_has_a_name_of_its_own(plant: Plant) -> None:
     own = yaml_file(plant.folder / 'b', 'host_b: {ros__parameters: {strict_lines: true}}')
     plant.start('-r', 'lines:__node:=host_b', '--params-file', own, reads='a')
-    assert until_status(plant.observer.diagnostics(''), 'lines', OK).name == 'host_b: lines'
+    diagnostics = plant.observer.diagnostics('')
+    assert ros.until_status(diagnostics, 'lines', ros.OK).name == 'host_b: lines'
     assert plant.observer.call(Trigger, '/host_b/reload', Trigger.Request()).success
 
 
@@ -324,11 +313,11 @@ def test_second_process_of_the_same_name_is_a_warning(plant: Plant, capfd: Outpu
     shown = plant.observer.diagnostics('')
     other = Node('lines', context=plant.observer.context)
     try:
-        until_status(shown, 'lines', ERROR, lambda status: status.message.startswith(
+        ros.until_status(shown, 'lines', ros.ERROR, lambda status: status.message.startswith(
             f'ERROR: 1 of 3 lines do not run; {text}'))
         plant.write_net('b', plant.plcs['b'].port)
         plant.observer.call(Trigger, '/lines/reload', Trigger.Request())
-        status = until_status(shown, 'lines', WARN)
+        status = ros.until_status(shown, 'lines', ros.WARN)
     finally:
         other.destroy_node()
     assert status.message.startswith(f'WARN: 3 of 3 lines run; {text}')
@@ -349,12 +338,12 @@ def test_line_with_faulty_files_is_told_and_the_others_run(
         plant: Plant, capfd: Output) -> None:
     (plant.folder / 'b_net.csv').write_text('Baud,Parity\n9601,Much\n')
     plant.start(reads='ac')
-    values = line_status(plant, ERROR)
+    values = line_status(plant, ros.ERROR)
     assert values['running'] == '2'
     assert values['/hall/b'].startswith(f'{plant.folder}/b_net.csv:2:1 (Baud): Baud = "9601"')
     assert f'; {plant.folder}/b_net.csv:2:2 (Parity): ' in values['/hall/b']
     plant.observer.call(Trigger, '/lines/reload', Trigger.Request())
-    line_status(plant, ERROR)
+    line_status(plant, ros.ERROR)
     told = capfd.readouterr().err.count('9601')
     assert 2 <= told <= 4  # at the start, and for each call, which may come again
     plant.write_net('b', plant.plcs['b'].port)
@@ -363,7 +352,7 @@ def test_line_with_faulty_files_is_told_and_the_others_run(
     assert plant.speeds('b') == [7, ord('b')]
     before = {**plant.nodes}
     plant.observer.call(Trigger, '/lines/reload', Trigger.Request())  # all lines run
-    assert line_status(plant, OK)['running'] == '3'
+    assert line_status(plant, ros.OK)['running'] == '3'
     assert plant.nodes == before
 
 
@@ -371,7 +360,7 @@ def test_line_whose_name_ros_refuses_is_told_and_the_others_run(
         plant: Plant, recwarn: pytest.WarningsRecorder) -> None:
     plant.plcs['b-1'] = plant.plcs.pop('b')
     plant.start(reads='ac')
-    values = line_status(plant, ERROR)
+    values = line_status(plant, ros.ERROR)
     assert values['running'] == '2'
     assert 'must not contain characters other than alphanumerics' in values['/hall/b-1']
     assert [warning for warning in recwarn if 'rosout' in str(warning.message)] == []
@@ -399,7 +388,7 @@ def test_two_lines_have_not_one_port_nor_one_place_of_guests(plant: Plant) -> No
     plant.write_net('b', str(other_name))
     plant.write_net('c', plant.plcs['c'].port, place.replace('/hmi', '//hmi'))
     plant.start(reads='a')
-    faults = line_status(plant, ERROR)
+    faults = line_status(plant, ros.ERROR)
     assert faults['/hall/b'] == f'port: {other_name} is the port of /hall/a'
     assert faults['/hall/c'] == f'port: pty:{plant.folder}//hmi is the place of /hall/a'
     plant.observer.until(lambda: not {'b', 'c'} & {*plant.observer.node.get_node_names()},
@@ -452,7 +441,7 @@ def test_internal_error_at_the_start_of_a_line(
     plant.observer.call(Trigger, '/lines/reload', Trigger.Request())
     assert [plant.speeds(name) for name in 'bac'] == [[7, ord(name)] for name in 'bac']
     assert len(made) == 2 and made[1] - made[0] >= module.RESTART_AFTER
-    assert line_status(plant, OK)['restarts'] == '2'
+    assert line_status(plant, ros.OK)['restarts'] == '2'
     assert "is started again: AttributeError('a bug')" in capfd.readouterr().err
 
 
@@ -470,14 +459,14 @@ def test_internal_error_restarts_its_line_only_and_its_slow_end_holds_up_no_othe
     monkeypatch.setattr(BridgeNode, 'publish_last_diagnostics', publish_last_diagnostics)
     plant.fail('b')
     plant.observer.until(slow.is_set, 'the end of a line')
-    assert until_status(plant.observer.diagnostics(plant.plcs['a'].port), 'link', OK)
-    assert line_status(plant, ERROR)['/hall/b'] == 'is started again'
+    assert ros.until_status(plant.observer.diagnostics(plant.plcs['a'].port), 'link', ros.OK)
+    assert line_status(plant, ros.ERROR)['/hall/b'] == 'is started again'
     ended.set()
     assert plant.speeds('b') == [7, ord('b')]
-    assert get_parameters(
+    assert ros.get_parameters(
         plant.observer, 'net.com_port', node='/hall/b') == [plant.plcs['b'].port]
     assert {name for name in 'abc' if not before[name].link.is_alive()} == {'b'}
-    assert line_status(plant, OK)['restarts'] == '1'
+    assert line_status(plant, ros.OK)['restarts'] == '1'
     said = capfd.readouterr().err
     assert 'ended by an internal error and is started again: internal error: TypeError' in said
     assert 'Traceback' in said
@@ -486,7 +475,7 @@ def test_internal_error_restarts_its_line_only_and_its_slow_end_holds_up_no_othe
 def test_status_of_all_lines_comes_once_a_second(plant: Plant) -> None:
     plant.start('-p', 'lines:=[a]')
     inbox = plant.observer.diagnostics('')
-    seconds = [stamp(inbox.next()) for _ in range(4)]
+    seconds = [ros.stamp(inbox.next()) for _ in range(4)]
     # Most of them: after one that a busy host has held up the next comes in time.
     assert median(later - one for one, later in pairwise(seconds)) > 0.8
 

@@ -40,30 +40,10 @@ from rclpy.duration import Duration
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from std_msgs.msg import (  # noqa: I101
-    Bool,
-    Int16MultiArray,
-    MultiArrayDimension,
-    MultiArrayLayout,
-    UInt8MultiArray,
-)
+from std_msgs import msg
 from std_srvs.srv import SetBool, Trigger
+from support import ros
 from support.commands import Output
-from support.ros import (
-    BridgeCell,
-    details,
-    ERROR,
-    EXAMPLE_FILES,
-    get_parameters,
-    Inbox,
-    Observer,
-    OK,
-    ros_args,
-    until_status,
-    values_in,
-    WARN,
-    write_csv,
-)
 
 # On a busy host this process may stand still for longer than PLCs are usually given time.
 NET = 'NAK_Retries,ENQ_Retries,Cmd_Timeout,Baud,Timeout\n1,1,5000,115200,3000\n'
@@ -83,13 +63,13 @@ PULSES = 'pulses,Write,B3:1/0,1,PLC5,8,'
 RECIPE = 'recipe,Write,N7:4,1,PLC5,2,'
 
 
-class Bench(BridgeCell):
+class Bench(ros.BridgeCell):
     """A bridge that has a port, with a map that may have faults."""
 
     def __init__(self, folder: Path, rows: tuple[str, ...], *assignments: str) -> None:
         super().__init__(folder, SIMULATOR, f'{MAP_HEADER}\n{SPEED}\n', NET,
                          'write_timeout:=30.0', *assignments)
-        write_csv(self.map, MAP_HEADER, rows)
+        ros.write_csv(self.map, MAP_HEADER, rows)
 
     def end(self, number: signal.Signals = signal.SIGTERM) -> int:
         """End the bridge, unless it has ended."""
@@ -102,7 +82,7 @@ class Bench(BridgeCell):
         publisher = self.ros.publisher(kind, f'/abdf1/write/{topic}')
         return lambda *values: publisher.publish(kind(data=values))
 
-    def until_results(self, count: int) -> Inbox:
+    def until_results(self, count: int) -> ros.Inbox:
         """Wait for so many results; there must not be more."""
         self.ros.until(
             lambda: len(self.results) >= count,
@@ -145,10 +125,10 @@ Benches = Callable[..., Bench]
 def test_each_mapping_of_a_topic_has_a_result_of_its_own(make_bench: Benches) -> None:
     bench = make_bench(*LAMPS)
     bench.plcs.say('error 2 60')
-    bench.publisher(UInt8MultiArray, 'lamps')(1, 0)
+    bench.publisher(msg.UInt8MultiArray, 'lamps')(1, 0)
     results = {result.name: result for result in bench.until_results(2)}
-    assert (results['lamp_a'].level, results['lamp_a'].message) == (OK, 'written')
-    assert results['lamp_b'].level == ERROR
+    assert (results['lamp_a'].level, results['lamp_a'].message) == (ros.OK, 'written')
+    assert results['lamp_b'].level == ros.ERROR
     assert results['lamp_b'].message.startswith('not written: the PLC refused it: STS 60: ')
     assert bench.words('B3:0') == [0b010]
     assert bench.words('B3:2', station=2) == [0]
@@ -161,8 +141,8 @@ def test_every_pulse_of_a_burst_is_sent_in_order(
         make_bench: Benches, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(queue, 'CARRIED_WITHIN', 15.0)  # the host may stand still
     bench = make_bench(PULSES, SPEED)
-    speed = bench.ros.listen(Int16MultiArray, '/abdf1/read/speed')
-    publish = bench.publisher(UInt8MultiArray, 'pulses')
+    speed = bench.ros.listen(msg.Int16MultiArray, '/abdf1/read/speed')
+    publish = bench.publisher(msg.UInt8MultiArray, 'pulses')
     speed.first()
     patterns = [tuple(number >> bit & 1 for bit in range(8)) for number in range(60)]
     speed.clear()
@@ -171,28 +151,28 @@ def test_every_pulse_of_a_burst_is_sent_in_order(
             publish(*pattern)
         results = bench.until_results(begin + 10)
     assert messages(results) == {'written': 60}
-    assert [details(result)['value'] for result in results] == [
+    assert [ros.details(result)['value'] for result in results] == [
         str(list(pattern)) for pattern in patterns]
     assert bench.words('B3:1') == [59]
     assert speed, 'no read went between 60 writes'
-    status = until_status(bench.diagnostics, 'writes', OK,
-                          lambda status: details(status)['confirmed'] == '60')
+    status = ros.until_status(bench.diagnostics, 'writes', ros.OK,
+                              lambda status: ros.details(status)['confirmed'] == '60')
     assert status.message == 'OK: 60 of 60 writes confirmed'
-    assert details(status)['accepted'] == '60'
+    assert ros.details(status)['accepted'] == '60'
 
 
 def test_messages_that_dds_drops_are_counted(
         make_bench: Benches, monkeypatch: pytest.MonkeyPatch, capfd: Output) -> None:
     monkeypatch.setattr('abdf1_ros.ros.topics.messages.WRITE_DEPTH', 50)
     bench = make_bench(RECIPE)
-    publish = bench.publisher(Int16MultiArray, 'recipe')
+    publish = bench.publisher(msg.Int16MultiArray, 'recipe')
     publish(0, 0)
     bench.until_results(1)
     for number in range(70):  # while nobody takes them
         publish(number, number)
     bench.until_results(51)
-    writes = until_status(bench.diagnostics, 'writes', WARN,
-                          lambda status: details(status)['lost on their way'] == '20')
+    writes = ros.until_status(bench.diagnostics, 'writes', ros.WARN,
+                              lambda status: ros.details(status)['lost on their way'] == '20')
     assert writes.message.endswith('; 20 messages were lost on their way here')
     assert '~/write/recipe: 20 messages were lost on their way here' in capfd.readouterr().err
 
@@ -208,7 +188,7 @@ def test_results_of_all_writes_that_wait_fit_into_their_queue(make_bench: Benche
 
 def test_station_with_another_error_code_is_told_once(make_bench: Benches, capfd: Output) -> None:
     bench = make_bench(SPEED, parameters=('net.error_code:=BCC', 'net.timeout:=100'))
-    until_status(bench.diagnostics, 'station 1', WARN)
+    ros.until_status(bench.diagnostics, 'station 1', ros.WARN)
     stations = bench.node.session.driver.stations
     # It goes on to come and go.
     bench.ros.until(lambda: stations[1].returns >= 5, 'more returns')
@@ -266,13 +246,14 @@ def test_bad_row_is_told_and_left_out_and_the_rest_runs(
         make_bench: Benches, capfd: Output) -> None:
     bench = make_bench('bad_station,Read,N7:0,255,SLC,1,', 'bad_type,Read,N7:0,2,PLC9,1,',
                        'missing,Read,N99:0,1,PLC5,1,', SPEED)
-    assert values_in(bench.ros.listen(Int16MultiArray, '/abdf1/read/speed').first()) == [0, 0]
+    speed = bench.ros.listen(msg.Int16MultiArray, '/abdf1/read/speed')
+    assert ros.values_in(speed.first()) == [0, 0]
     # What only the PLC can know shows in the diagnostics, mapping by mapping, and in the log.
-    status = until_status(bench.diagnostics, 'mappings', ERROR, lambda status: (
+    status = ros.until_status(bench.diagnostics, 'mappings', ros.ERROR, lambda status: (
         'of 2 mappings 1 failed, 1 fresh; 2 rows left out of the map, the first at '
         in status.message))
     reason = 'STS F0 EXT STS 06: address does not point to something usable'
-    assert details(status)['missing'] == f'failed: N99:0 at station 1, never read; {reason}'
+    assert ros.details(status)['missing'] == f'failed: N99:0 at station 1, never read; {reason}'
     errors: list[str] = []
 
     def are_all_told() -> bool:  # the log may come after the diagnostics
@@ -294,8 +275,8 @@ def test_bad_row_is_told_and_left_out_and_the_rest_runs(
 def test_tag_cannot_forge_lines_or_statuses(make_bench: Benches, capfd: Output) -> None:
     tag, shown = 'lamp\x0b[FATAL] all is lost\x1b[2J', r'lamp\x0b[FATAL] all is lost\x1b[2J'
     bench = make_bench(f'"{tag}",ReadWrite,N99:0,1,PLC5,1,recipe')
-    assert shown in details(until_status(bench.diagnostics, 'mappings', ERROR))
-    bench.publisher(Int16MultiArray, 'recipe')(1, 2)
+    assert shown in ros.details(ros.until_status(bench.diagnostics, 'mappings', ros.ERROR))
+    bench.publisher(msg.Int16MultiArray, 'recipe')(1, 2)
     (result,) = bench.until_results(1)
     assert result.name == shown
     bench.node.session.end()  # rows without a value are told together, a little later
@@ -309,7 +290,8 @@ def test_tag_cannot_forge_lines_or_statuses(make_bench: Benches, capfd: Output) 
 
 def test_every_value_of_a_long_block_is_published(make_bench: Benches) -> None:
     bench = make_bench(*[f'w{number},Read,N7:{number},1,PLC5,1' for number in range(9)])
-    inboxes = [bench.ros.listen(Int16MultiArray, f'/abdf1/read/w{number}') for number in range(9)]
+    inboxes = [bench.ros.listen(msg.Int16MultiArray, f'/abdf1/read/w{number}')
+               for number in range(9)]
     assert len(bench.node.session.driver.readings.blocks) == 1
     bench.plcs[1].table.write(parse_address('N7:0', PlcType.PLC5), bytes(range(18)))
     for number, inbox in enumerate(inboxes):
@@ -322,15 +304,15 @@ def test_every_value_of_a_long_block_is_published(make_bench: Benches) -> None:
 def test_stop_ends_all_threads_and_gives_the_port_back(make_bench: Benches) -> None:
     bench = make_bench(SPEED)
     link = bench.node.link
-    speed = bench.ros.listen(Int16MultiArray, '/abdf1/read/speed')
+    speed = bench.ros.listen(msg.Int16MultiArray, '/abdf1/read/speed')
     speed.first()
     assert (len(link_threads()), times_open(bench.plcs.port)) == (2, 2)
     bench.end()
     assert not link.is_alive()
     assert (len(link_threads()), times_open(bench.plcs.port)) == (1, 1)  # those of the PLCs
     assert link.state == PortState(False, 'closed')
-    until_status(bench.diagnostics, 'link', ERROR,
-                 lambda status: status.message == 'ERROR: closed')
+    ros.until_status(bench.diagnostics, 'link', ros.ERROR,
+                     lambda status: status.message == 'ERROR: closed')
     bench.start()  # the port is free for another one
     speed.next()
 
@@ -359,8 +341,8 @@ def test_internal_errors_are_told_and_the_third_is_the_end(
     bench.node.session.events.read = None  # a bug
     bench.ros.until(lambda: bench.node.link.has_failed, 'the third fault')
     bench.node.link.join()
-    until_status(bench.diagnostics, 'link', ERROR, lambda status: status.message.startswith(
-        'ERROR: internal error: TypeError('))
+    ros.until_status(bench.diagnostics, 'link', ros.ERROR, lambda status:
+                     status.message.startswith('ERROR: internal error: TypeError('))
     assert ''.join(capfd.readouterr()).count('; please report it\nTraceback') == 3
 
 
@@ -400,7 +382,7 @@ def test_node_whose_name_cannot_be_read_keeps_no_message_back(
 
     monkeypatch.setattr(Node, 'get_node_names_and_namespaces', names)
     bench = make_bench(RECIPE)
-    bench.publisher(Int16MultiArray, 'recipe')(5, 6)
+    bench.publisher(msg.Int16MultiArray, 'recipe')(5, 6)
     bench.until_results(1)
     assert bench.words('N7:4', 2) == [5, 6]
     assert 'a periodic check has failed, all else goes on: UnicodeDe' in capfd.readouterr().err
@@ -408,13 +390,13 @@ def test_node_whose_name_cannot_be_read_keeps_no_message_back(
 
 def test_duplicate_name_is_told_and_forgotten(make_bench: Benches, capfd: Output) -> None:
     bench = make_bench(SPEED)
-    until_status(bench.diagnostics, 'link', OK)
+    ros.until_status(bench.diagnostics, 'link', ros.OK)
     other = Node('abdf1', context=bench.ros.context, use_global_arguments=False)
-    status = until_status(bench.diagnostics, 'link', WARN)
+    status = ros.until_status(bench.diagnostics, 'link', ros.WARN)
     assert '; another node is called /abdf1 too' in status.message
     other.destroy_node()
     bench.diagnostics.clear()
-    until_status(bench.diagnostics, 'link', OK)
+    ros.until_status(bench.diagnostics, 'link', ros.OK)
     told = ''.join(capfd.readouterr())
     assert '[abdf1]: another node is called /abdf1 too' in told
     assert 'no other node is called /abdf1 any more' in told
@@ -427,7 +409,7 @@ def test_other_node_of_our_name_is_told_before_the_first_write_is_taken(
     other = Node('abdf1', context=bench.ros.context, use_global_arguments=False,
                  start_parameter_services=False)
     with bench:
-        bench.publisher(Int16MultiArray, 'recipe')(1, 2)
+        bench.publisher(msg.Int16MultiArray, 'recipe')(1, 2)
         bench.ros.until(lambda: bench.node.writes.taken, 'the write')
         assert '[abdf1]: another node is called /abdf1 too' in ''.join(capfd.readouterr())
         assert bench.until_results(1)[0].message == 'written'
@@ -438,12 +420,12 @@ def test_messages_wait_for_the_first_look_and_have_a_result_at_an_end_before_it(
         make_bench: Benches, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(graph, 'DISCOVERY', math.inf)
     bench = make_bench(RECIPE)
-    bench.publisher(Int16MultiArray, 'recipe')(1, 2)
+    bench.publisher(msg.Int16MultiArray, 'recipe')(1, 2)
     refuse = bench.node.session.begin_end
 
     def refuse_after_a_while() -> None:
         for _ in range(3):
-            assert get_parameters(bench.ros, 'port') == [bench.plcs.port]
+            assert ros.get_parameters(bench.ros, 'port') == [bench.plcs.port]
         assert not bench.node.writes.taken
         refuse()
 
@@ -460,8 +442,8 @@ def test_end_of_another_type_on_a_topic_is_told(make_bench: Benches, capfd: Outp
         said[0] += capfd.readouterr().err
         return 'std_msgs/msg/Bool,' in said[0]
 
-    with Observer() as other:  # a participant of its own, as one has no topic with two types
-        other.node.create_subscription(Bool, '/abdf1/read/speed', print, 10)
+    with ros.Observer() as other:  # a participant of its own, as one has no topic with two types
+        other.node.create_subscription(msg.Bool, '/abdf1/read/speed', print, 10)
         bench.ros.until(is_told, 'a line of the log')
     (line,) = [line for line in said[0].splitlines() if 'std_msgs/msg/Bool' in line]
     assert line.startswith('[WARN] ')
@@ -470,13 +452,13 @@ def test_end_of_another_type_on_a_topic_is_told(make_bench: Benches, capfd: Outp
 
 def test_two_writers_of_a_topic_can_tell_their_results_apart(make_bench: Benches) -> None:
     bench = make_bench(RECIPE)
-    publisher = bench.ros.publisher(Int16MultiArray, '/abdf1/write/recipe')
+    publisher = bench.ros.publisher(msg.Int16MultiArray, '/abdf1/write/recipe')
     for label, values in ((200 * 'robot', [1, 2]), ('robot_2\x07', [1])):
-        layout = MultiArrayLayout(dim=[MultiArrayDimension(label=label)])
-        publisher.publish(Int16MultiArray(layout=layout, data=values))
+        layout = msg.MultiArrayLayout(dim=[msg.MultiArrayDimension(label=label)])
+        publisher.publish(msg.Int16MultiArray(layout=layout, data=values))
     before = time.time_ns()
-    publisher.publish(Int16MultiArray(data=[3, 4]))
-    requests = [details(result)['request'] for result in bench.until_results(3)]
+    publisher.publish(msg.Int16MultiArray(data=[3, 4]))
+    requests = [ros.details(result)['request'] for result in bench.until_results(3)]
     number, = {*requests} - {200 * 'robot', r'robot_2\x07'}
     assert len(requests) == 3
     assert before <= int(number) <= time.time_ns()
@@ -514,8 +496,8 @@ def test_map_without_a_row_is_told(make_bench: Benches, capfd: Output) -> None:
 
 
 def test_each_faulty_parameter_is_told_in_one_line(refusal: Callable[..., list[str]]) -> None:
-    lines = refusal(*ros_args(
-        *EXAMPLE_FILES, 'net_file:=/nowhere/net.csv', 'diagnostics_period:=abc', 'gain:=3'))
+    lines = refusal(*ros.ros_args(
+        *ros.EXAMPLE_FILES, 'net_file:=/nowhere/net.csv', 'diagnostics_period:=abc', 'gain:=3'))
     assert [re.sub(r' \[[0-9.]+\]', '', line) for line in lines] == [
         f'[FATAL] [abdf1]: {text}' for text in (
             'parameter gain: there is no such parameter; another version may have it',
@@ -555,7 +537,7 @@ def test_security_that_ros_may_leave_out_is_told(
         refusal: Callable[..., list[str]], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv('ROS_SECURITY_ENABLE', 'true')
     monkeypatch.setenv('ROS_SECURITY_KEYSTORE', '')
-    first, *_ = refusal(*ros_args(*EXAMPLE_FILES, 'gain:=3'))
+    first, *_ = refusal(*ros.ros_args(*ros.EXAMPLE_FILES, 'gain:=3'))
     assert first.startswith('[WARN] [')
     assert 'ROS_SECURITY_STRATEGY is not Enforce: if ROS finds no keys, it starts without' in first
     monkeypatch.setenv('ROS_SECURITY_STRATEGY', 'Enforce')

@@ -26,16 +26,7 @@ from abdf1_ros.ros.process import main
 import pytest
 from rclpy.duration import Infinite
 from std_msgs import msg
-from support.ros import (
-    details,
-    ERROR,
-    get_parameters,
-    Observer,
-    Process,
-    until_status,
-    values_in,
-    write_csv,
-)
+from support import ros
 from support.simulator_process import Files, make_files, MAP_HEADER, NET_HEADER, NET_ROW, STATUSES
 
 
@@ -86,24 +77,24 @@ def test_ends_with_its_terminal_but_not_under_nohup(
 
 
 def test_silent_station_is_told_at_once_and_does_not_delay_the_end(
-        observer: Observer, files: Files) -> None:
+        observer: ros.Observer, files: Files) -> None:
     diagnostics = observer.diagnostics(files.port)
-    with Process('node', *files.args('diagnostics_period:=60', 'net.cmd_timeout:=500',
-                                     'net.timeout:=200')) as node:
+    with ros.Process('node', *files.args('diagnostics_period:=60', 'net.cmd_timeout:=500',
+                                         'net.timeout:=200')) as node:
         observer.meet('/abdf1')  # what is told once is told to who listens
         with files.start_simulator() as simulator:
             diagnostics.until_fresh()
             diagnostics.clear()
             simulator.say('silent 2')
-            until_status(diagnostics, 'station 2', ERROR)
+            ros.until_status(diagnostics, 'station 2', ros.ERROR)
             simulator.say('silent 1')
-            status = until_status(diagnostics, 'link', ERROR)
+            status = ros.until_status(diagnostics, 'link', ros.ERROR)
             assert status.message == 'ERROR: port open, but none of 2 stations answers'
             diagnostics.clear()
             node.end(signal.SIGINT)
             simulator.end()
-            status = until_status(diagnostics, 'link', ERROR,
-                                  lambda status: details(status)['port'] == 'closed')
+            status = ros.until_status(diagnostics, 'link', ros.ERROR,
+                                      lambda status: ros.details(status)['port'] == 'closed')
             assert status.message == 'ERROR: closed'
     observer.forget(diagnostics)
 
@@ -113,7 +104,7 @@ def test_silent_station_is_told_at_once_and_does_not_delay_the_end(
 
 def refused_start(*arguments: str, status: int = 2) -> list[str]:
     """Return the lines of a node that does not start; its log is that of no other."""
-    with Process('node', *arguments) as node:
+    with ros.Process('node', *arguments) as node:
         assert node.result() == status, node.text
         assert 'Traceback' not in node.text
         return node.lines
@@ -151,11 +142,11 @@ def test_user_without_a_home_is_told_what_to_set(monkeypatch: pytest.MonkeyPatch
 
 
 def test_trace_that_cannot_be_written_is_an_error_and_no_stop(
-        observer: Observer, files: Files) -> None:
+        observer: ros.Observer, files: Files) -> None:
     trace = files.folder / 'nowhere' / 'field.cap'
     speeds = observer.listen(msg.Int16MultiArray, '/traced/read/speeds')
-    with files.start_simulator() as simulator, \
-            Process('node', *files.args(f'trace_file:={trace}'), '-r', '__node:=traced') as node:
+    args = (*files.args(f'trace_file:={trace}'), '-r', '__node:=traced')
+    with files.start_simulator() as simulator, ros.Process('node', *args) as node:
         node.wait_for('[ERROR] ', f'trace_file: {trace}: No such file or directory; '
                                   'nothing is recorded')
         speeds.values([1200, -800])
@@ -164,19 +155,19 @@ def test_trace_that_cannot_be_written_is_an_error_and_no_stop(
     observer.forget(speeds)
 
 
-def test_names_can_be_remapped(observer: Observer, files: Files) -> None:
+def test_names_can_be_remapped(observer: ros.Observer, files: Files) -> None:
     diagnostics = observer.diagnostics(files.port)
     door = observer.listen(msg.UInt8MultiArray, '/cell/door_closed')
     bits = observer.listen(msg.UInt8MultiArray, '/cell/line_a/read/bits')
     active = observer.listen(msg.UInt16MultiArray, '/cell/line_a/active_stations')
     remaps = ('-r', '__ns:=/cell', '-r', '__node:=line_a', '-r', '~/read/door:=/cell/door_closed')
     with files.start_simulator() as simulator, \
-            Process('node', *files.args('use_sim_time:=true', 'map.recipe.max:=5',
-                                        'send_in_sequence:=true'), *remaps) as node:
+            ros.Process('node', *files.args('use_sim_time:=true', 'map.recipe.max:=5',
+                                            'send_in_sequence:=true'), *remaps) as node:
         node.wait_for('[WARN] ', 'without effect', ': map.recipe.max')
         node.wait_for('[WARN] ', 'send_in_sequence without effect: only for Mode Master')
-        assert values_in(door.first()) == [1]
-        assert values_in(bits.first()) == [1, 0, 0, 1, 1, 0]
+        assert ros.values_in(door.first()) == [1]
+        assert ros.values_in(bits.first()) == [1, 0, 0, 1, 1, 0]
         assert active.first().data[0] == 0b110
         # Also with the clock of a simulation, which nobody publishes here.
         diagnostics.until_fresh()
@@ -185,7 +176,7 @@ def test_names_can_be_remapped(observer: Observer, files: Files) -> None:
         assert not observer.node.count_publishers('/cell/line_a/read/door')
         observer.until(
             lambda: observer.node.count_subscribers('/cell/line_a/write/flags'), 'a subscriber')
-        assert get_parameters(observer, 'net.baud', node='/cell/line_a') == [115200]
+        assert ros.get_parameters(observer, 'net.baud', node='/cell/line_a') == [115200]
         node.end()
         simulator.end()
     for inbox in (diagnostics, door, bits, active):
@@ -193,25 +184,25 @@ def test_names_can_be_remapped(observer: Observer, files: Files) -> None:
 
 
 def test_full_duplex_bridge_is_read_and_written_by_the_plc(
-        observer: Observer, files: Files) -> None:
-    write_csv(files.net, f'Mode,PLC_Type,{NET_HEADER}', [f'Peer,PLC5,{NET_ROW}'])
-    write_csv(files.map, MAP_HEADER, [
+        observer: ros.Observer, files: Files) -> None:
+    ros.write_csv(files.net, f'Mode,PLC_Type,{NET_HEADER}', [f'Peer,PLC5,{NET_ROW}'])
+    ros.write_csv(files.map, MAP_HEADER, [
         'speeds,Read,N7:0,1,PLC5,2,,,,,', 'orders,Serve,N7:50,5,PLC5,2,,,,,'])
     speeds = observer.listen(msg.Int16MultiArray, '/peer/read/speeds')
     orders = observer.listen(msg.Int16MultiArray, '/peer/read/orders')
     results = observer.results('/peer')
     arguments = ('--pty', str(files.port), '--data', str(files.simulator))
-    with Process('simulator', *arguments, '--full-duplex', '1') as simulator:
+    with ros.Process('simulator', *arguments, '--full-duplex', '1') as simulator:
         simulator.wait_for('stations 1 (PLC5) on')
-        with Process('node', *files.args(), '-r', '__node:=peer') as node:
-            assert values_in(speeds.first()) == [1200, -800]
+        with ros.Process('node', *files.args(), '-r', '__node:=peer') as node:
+            assert ros.values_in(speeds.first()) == [1200, -800]
             (endpoint,) = observer.until(
                 lambda: observer.node.get_publishers_info_by_topic('/peer/read/orders'),
                 'the publisher')
             assert endpoint.qos_profile.deadline == Infinite  # the PLC writes when it likes
             assert not orders
             simulator.say('msg 1 N7:50 11 -22')
-            assert values_in(orders.first()) == [11, -22]
+            assert ros.values_in(orders.first()) == [11, -22]
             simulator.wait_for('station 1: msg N7:50 confirmed')
             publisher = observer.publisher(msg.Int16MultiArray, '/peer/write/orders')
             publisher.publish(msg.Int16MultiArray(data=[3, 4]))

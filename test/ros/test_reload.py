@@ -41,20 +41,10 @@ from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 from std_msgs.msg import Float32MultiArray, Int16MultiArray, String, UInt16MultiArray
 from std_srvs.srv import SetBool, Trigger
+from support import ros
 from support.commands import Output
 from support.mappings import make_mapping
 from support.ptys import PATIENCE
-from support.ros import (
-    BridgeCell,
-    details,
-    EVERYTHING,
-    find_status,
-    OK,
-    until_status,
-    values_in,
-    WARN,
-    write_csv,
-)
 
 DATA = 'Station,PLC_Type,Address,Length,Values\n1,PLC5,N7:0,16,7 8\n1,PLC5,F8:0,4,1.5\n'
 HEADER = 'Tag,Command,Address,Station,PLC_Type,Length'
@@ -63,14 +53,14 @@ LEVEL = 'level,ReadWrite,F8:0,1,PLC5,1'
 RECIPE = 'recipe,Write,N7:4,1,PLC5,2'
 
 
-class Bench(BridgeCell):
+class Bench(ros.BridgeCell):
     """A bridge on simulated PLCs, whose files can be written anew."""
 
     def write_net(self, timeout: int, baud: int = 115200) -> None:
-        write_csv(self.net, 'Baud,Timeout', [f'{baud},{timeout}'])
+        ros.write_csv(self.net, 'Baud,Timeout', [f'{baud},{timeout}'])
 
     def write_map(self, *rows: str) -> None:
-        write_csv(self.map, HEADER, rows)
+        ros.write_csv(self.map, HEADER, rows)
 
     def reload(self) -> tuple[bool, str]:
         """Ask for it; return what the service says."""
@@ -98,7 +88,7 @@ def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
 
 
 def test_rows_come_and_go_and_others_are_not_disturbed(bench: Bench, capfd: Output) -> None:
-    speeds = bench.ros.listen(Int16MultiArray, '/abdf1/read/speed', EVERYTHING)
+    speeds = bench.ros.listen(Int16MultiArray, '/abdf1/read/speed', ros.EVERYTHING)
     speeds.values([7, 8])
     publisher, = (each for each in bench.node.publishers if each.topic_name == speeds.topic)
     bench.write_map(SPEED, LEVEL)
@@ -106,8 +96,8 @@ def test_rows_come_and_go_and_others_are_not_disturbed(bench: Bench, capfd: Outp
     assert bench.reload() == (True, (
         f'{bench.node.session.configuration}; new: level; gone: recipe'))
     assert bench.node.session.driver.stations[1].has_gateway
-    assert values_in(bench.ros.listen(Float32MultiArray, '/abdf1/read/level').first()) == [1.5]
-    assert values_in(speeds.next()) == [7, 8]
+    assert ros.values_in(bench.ros.listen(Float32MultiArray, '/abdf1/read/level').first()) == [1.5]
+    assert ros.values_in(speeds.next()) == [7, 8]
     assert publisher in bench.node.publishers
     for port, station in ((bench.plcs.port, 77), (f'/.{bench.plcs.port}', 77)):
         publisher, = (each for each in bench.node.publishers if each.topic_name == speeds.topic)
@@ -118,7 +108,7 @@ def test_rows_come_and_go_and_others_are_not_disturbed(bench: Bench, capfd: Outp
     node = bench.ros.node
     bench.ros.until(lambda: node.count_subscribers('/abdf1/write/level'), 'a topic')
     bench.ros.until(lambda: not node.count_subscribers('/abdf1/write/recipe'), 'its end')
-    assert values_in(bench.ros.listen(Float32MultiArray, '/abdf1/read/level').first()) == [1.5]
+    assert ros.values_in(bench.ros.listen(Float32MultiArray, '/abdf1/read/level').first()) == [1.5]
     assert f'/.{bench.plcs.port}: open' in capfd.readouterr().err  # the new session is told
     bench.write_map(LEVEL)
     assert bench.reload()[0]
@@ -135,9 +125,9 @@ def test_writes_go_to_the_new_map(bench: Bench) -> None:
     bench.ros.until(lambda: bench.node.session.driver.is_online, 'the port')
     publisher.publish(Int16MultiArray(data=[3, 4]))
     result = results.next()
-    assert (result.message, details(result)['address']) == ('written', 'N7:8')
-    writes = until_status(bench.diagnostics, 'writes', OK,
-                          lambda status: details(status)['confirmed'] == '1')
+    assert (result.message, ros.details(result)['address']) == ('written', 'N7:8')
+    writes = ros.until_status(bench.diagnostics, 'writes', ros.OK,
+                              lambda status: ros.details(status)['confirmed'] == '1')
     assert writes.message == 'OK: 1 of 1 writes confirmed'
 
 
@@ -174,8 +164,8 @@ def test_faulty_files_change_nothing(bench: Bench, capfd: Output) -> None:
     assert bench.parameter('net.baud') == 115200
     assert bench.parameter('map.recipe.address') == 'N7:4'
     assert bench.parameter('map.level.address') is None
-    speeds = bench.ros.listen(Int16MultiArray, '/abdf1/read/speed', EVERYTHING)
-    assert values_in(speeds.first()) == [7, 8]
+    speeds = bench.ros.listen(Int16MultiArray, '/abdf1/read/speed', ros.EVERYTHING)
+    assert ros.values_in(speeds.first()) == [7, 8]
     assert f'{bench.net}:2:1 (Baud): Baud = "9601"' in capfd.readouterr().err
     bench.write_map(LEVEL)
     bench.write_net(100)
@@ -199,7 +189,7 @@ def test_place_that_is_no_longer_shared_is_free_for_another_line(
         bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     places = [f'pty:{tmp_path}/{name}' for name in ('first', 'second')]
     for place in places:
-        write_csv(bench.net, 'Baud,Timeout,Share', [f'115200,100,{place}'])
+        ros.write_csv(bench.net, 'Baud,Timeout,Share', [f'115200,100,{place}'])
         assert bench.reload()[0]
         bench.ros.until(Path(place.removeprefix('pty:')).is_symlink, 'the place')
     assert not (tmp_path / 'first').is_symlink()
@@ -209,7 +199,7 @@ def test_place_that_is_no_longer_shared_is_free_for_another_line(
         bench.port_owners.hold('/other', places[1])
     monkeypatch.setattr('abdf1_ros.ros.bridge.node.refuse_harm', lambda *files:
                         bench.port_owners.hold('/other', places[1]))  # it still has both
-    write_csv(bench.net, 'Baud,Timeout,Share', [f'115200,100,{places[0]}new'])
+    ros.write_csv(bench.net, 'Baud,Timeout,Share', [f'115200,100,{places[0]}new'])
     assert bench.reload()[1] == f'goes on as before: port: {places[1]} is the place of /abdf1'
     bench.port_owners.hold('/other', f'{places[0]}new')
 
@@ -229,7 +219,7 @@ def test_link_that_does_not_take_the_files_is_the_end(
 def test_signal_that_comes_during_a_reload_is_no_failure(
         bench: Bench, step: str, monkeypatch: pytest.MonkeyPatch) -> None:
     place = bench.map.with_name('place')
-    write_csv(bench.net, 'Baud,Timeout,Share', [f'115200,100,pty:{place}'])
+    ros.write_csv(bench.net, 'Baud,Timeout,Share', [f'115200,100,pty:{place}'])
     assert bench.reload()[0]
     monkeypatch.setattr(f'abdf1_ros.ros.bridge.node.{step}', lambda *made, **_: (
         bench.node.begin_end(), step == 'BridgeSession' and BridgeSession(*made))[1])
@@ -248,7 +238,7 @@ def test_files_that_cannot_be_taken_leave_topics_and_services_to_the_old_driver(
     node.create_publisher(String, '~/read/level', 1)  # DDS allows one type for a topic
     publishers = [*node.publishers]
     bench.write_map(SPEED, 'more,Read,N7:8,1,PLC5,3', LEVEL)
-    write_csv(bench.net, 'Baud,Timeout,Share', ['115200,100,tcp:4501'])
+    ros.write_csv(bench.net, 'Baud,Timeout,Share', ['115200,100,tcp:4501'])
     assert bench.polling(False)[0]
     assert bench.reload()[1].startswith('refused: RCLError')
     assert ([*node.publishers], node.link.is_released) == (publishers, True)
@@ -272,15 +262,15 @@ CROWD = '~/write/recipe has more than one publisher'
 
 def test_second_publisher_is_found_again(bench: Bench, capfd: Output) -> None:
     rows = [f'{RECIPE},,0 0,60000', 'south,Write,N7:8,1,PLC5,2,recipe,0 0,60000']
-    write_csv(bench.map, f'{HEADER},Topic,Fallback,Fallback_After', rows)
+    ros.write_csv(bench.map, f'{HEADER},Topic,Fallback,Fallback_After', rows)
     publishers = []
     for _ in range(2):
         assert bench.reload()[0]
         bench.diagnostics.clear()
         while len(publishers) < 2:
             publishers.append(bench.ros.publisher(Int16MultiArray, '/abdf1/write/recipe'))
-        until_status(bench.diagnostics, 'interlocks', WARN,
-                     lambda status: 'recipe: more than one publisher' in status.message)
+        ros.until_status(bench.diagnostics, 'interlocks', ros.WARN,
+                         lambda status: 'recipe: more than one publisher' in status.message)
     assert capfd.readouterr().err.count(CROWD) == 2
 
 
@@ -331,18 +321,18 @@ def test_other_node_of_our_name_stays_known(bench: Bench) -> None:
     other = Node('abdf1', context=bench.ros.context, use_global_arguments=False,
                  start_parameter_services=False)
     text = 'another node is called /abdf1 too'
-    until_status(bench.diagnostics, 'link', WARN, lambda status: text in status.message)
+    ros.until_status(bench.diagnostics, 'link', ros.WARN, lambda status: text in status.message)
     assert bench.reload()[0]
     for _ in range(2):
         bench.diagnostics.next()
-        assert text in find_status(bench.diagnostics[-1], 'link').message
+        assert text in ros.find_status(bench.diagnostics[-1], 'link').message
     other.destroy_node()
 
 
 def test_parameters_tell_what_is_in_the_files_now(bench: Bench) -> None:
     opener, capture = bench.node.surroundings.opener, Path(f'{bench.net}.cap')
     opener.trace(str(capture), 1e6, {}, print)
-    write_csv(bench.net, 'Baud,Timeout,Error_Code', ['115200,250,BCC'])
+    ros.write_csv(bench.net, 'Baud,Timeout,Error_Code', ['115200,250,BCC'])
     bench.write_map(LEVEL)
     assert bench.reload()[0]
     opener.close()
@@ -356,25 +346,26 @@ def test_parameters_tell_what_is_in_the_files_now(bench: Bench) -> None:
 def test_other_speed_opens_the_port_anew(bench: Bench, capfd: Output) -> None:
     bench.write_net(100, 19200)
     assert bench.reload()[0]
-    speeds = bench.ros.listen(Int16MultiArray, '/abdf1/read/speed', EVERYTHING)
-    assert values_in(speeds.first()) == [7, 8]
+    speeds = bench.ros.listen(Int16MultiArray, '/abdf1/read/speed', ros.EVERYTHING)
+    assert ros.values_in(speeds.first()) == [7, 8]
     settings = bench.node.surroundings.opener.settings
     assert (settings.baud, settings.rs485, settings.low_latency) == (19200, True, False)
 
 
 def test_file_that_has_changed_is_told_once(bench: Bench, capfd: Output) -> None:
-    assert details(until_status(bench.diagnostics, 'link', OK))['files'] == 'as read'
+    assert ros.details(ros.until_status(bench.diagnostics, 'link', ros.OK))['files'] == 'as read'
     bench.write_net(250)
     bench.write_map(SPEED)
     text = 'net.csv, map.csv changed since read; call ~/reload to read again'
-    until_status(bench.diagnostics, 'link', OK, lambda status: details(status)['files'] == text)
+    ros.until_status(
+        bench.diagnostics, 'link', ros.OK, lambda status: ros.details(status)['files'] == text)
     bench.diagnostics.clear()
     for _ in range(2):  # it has been looked at several times more
         bench.diagnostics.next()
     assert capfd.readouterr().err.count(text) == 1
     assert bench.reload()[0]
-    until_status(bench.diagnostics, 'link', OK,
-                 lambda status: details(status)['files'] == 'as read')
+    ros.until_status(bench.diagnostics, 'link', ros.OK,
+                     lambda status: ros.details(status)['files'] == 'as read')
 
 
 def test_whoever_waits_for_link_counters_is_told_of_the_new_files(bench: Bench) -> None:
@@ -399,19 +390,19 @@ def test_files_are_read_again_while_the_port_is_left_to_others(bench: Bench) -> 
     assert bench.reload()[0]
     open_port(PortSettings(bench.plcs.port)).close()
     assert bench.polling(True)[0]
-    assert values_in(bench.ros.listen(Float32MultiArray, '/abdf1/read/level').first()) == [1.5]
+    assert ros.values_in(bench.ros.listen(Float32MultiArray, '/abdf1/read/level').first()) == [1.5]
 
 
 def test_port_is_left_to_others_and_taken_again(bench: Bench, capfd: Output) -> None:
     text = 'polling is off, so other programs may use the port'
-    until_status(bench.diagnostics, 'link', OK)
+    ros.until_status(bench.diagnostics, 'link', ros.OK)
     assert bench.polling(False) == (True, f'{bench.plcs.port}: {text}')
     open_port(PortSettings(bench.plcs.port)).close()  # which is exclusive
-    assert until_status(bench.diagnostics, 'link', WARN).message == f'WARN: {text}'
+    assert ros.until_status(bench.diagnostics, 'link', ros.WARN).message == f'WARN: {text}'
     line, = (line for line in capfd.readouterr().err.splitlines() if text in line)
     assert line.startswith('[INFO] ')
     active = bench.ros.listen(UInt16MultiArray, '/abdf1/active_stations')
-    assert values_in(active.first()) == 16 * [0]
+    assert ros.values_in(active.first()) == 16 * [0]
     counters = bench.call(Trigger, 'read_link_counters', Trigger.Request())
     assert (counters.success, counters.message) == (
         False, 'no station to ask: the port is not open')
@@ -420,9 +411,9 @@ def test_port_is_left_to_others_and_taken_again(bench: Bench, capfd: Output) -> 
     publisher.publish(Int16MultiArray(data=[1, 2]))
     assert results.next().message == 'not written: refused: the port is not open'
     assert bench.polling(True) == (True, f'{bench.plcs.port} is being opened')
-    speeds = bench.ros.listen(Int16MultiArray, '/abdf1/read/speed', EVERYTHING)
-    assert values_in(speeds.first()) == [7, 8]
-    until_status(bench.diagnostics, 'link', OK)
+    speeds = bench.ros.listen(Int16MultiArray, '/abdf1/read/speed', ros.EVERYTHING)
+    assert ros.values_in(speeds.first()) == [7, 8]
+    ros.until_status(bench.diagnostics, 'link', ros.OK)
 
 
 # Files
