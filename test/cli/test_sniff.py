@@ -36,6 +36,7 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.sniffer.capture import Chunk, Direction, read_capture
 from abdf1_ros.sniffer.packet_files import PacketFile
 import pytest
+from support.captures import write_capture
 from support.cases import for_all
 from support.commands import Output, running_simulator
 from support.forked import Forked
@@ -69,12 +70,7 @@ def _signal_handlers() -> Iterator[None]:
 
 @pytest.fixture
 def capture(tmp_path: Path) -> str:
-    path = tmp_path / 'line.cap'
-    lines = ['# abdf1_ros capture 1', '# baud: 9600', '# check: CRC', '# duplex: half']
-    lines += [f'{count / 100:.6f} {way} {data.hex(" ")}'
-              for count, (way, data) in enumerate(zip(WAYS, SAID))]
-    path.write_text('\n'.join([*lines, '']), encoding='ascii')
-    return str(path)
+    return write_capture(tmp_path / 'line.cap', zip(WAYS, SAID))
 
 
 def lines_of(capsys: Output, *args: str) -> list[str]:

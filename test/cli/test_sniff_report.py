@@ -24,6 +24,7 @@ from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.packet import Packet
 import pytest
+from support.captures import write_capture
 from support.vectors import pair
 
 READ = Packet(2, 5, 0x0F, 0, 0x1234, bytes.fromhex('A2 04 07 89 00 00'))
@@ -42,12 +43,7 @@ def _frames() -> list[tuple[str, bytes]]:
 
 @pytest.fixture
 def capture(tmp_path: Path) -> str:
-    path = tmp_path / 'line.cap'
-    lines = ['# abdf1_ros capture 1', '# baud: 9600', '# check: CRC', '# duplex: half']
-    lines += [f'{count / 100:.6f} {way} {data.hex(" ")}'
-              for count, (way, data) in enumerate(_frames())]
-    path.write_text('\n'.join([*lines, '']), encoding='ascii')
-    return str(path)
+    return write_capture(tmp_path / 'line.cap', _frames())
 
 
 def unpacked(path: str | Path) -> dict[str, str]:
@@ -175,8 +171,6 @@ def test_anonymous_bundle_has_no_name_of_a_host_user_path_or_port(
 
 def test_processor_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str],
                             monkeypatch: pytest.MonkeyPatch) -> None:
-    path = tmp_path / 'status.cap'
-    lines = ['# abdf1_ros capture 1', '# check: CRC', '# duplex: full']
     asked, told = pair('diag_status_slc504')
     halted = told.data[:18] + b'\x5E\x20' + told.data[20:]
     said = [asked._replace(dst=4), told._replace(src=4, data=halted), asked, told,
@@ -185,23 +179,22 @@ def test_processor_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str],
     for number, station in enumerate((9, told.src), 1):  # they refuse the question
         said.append(asked._replace(dst=station, tns=asked.tns + number))
         said.append(said[-1].reply(b'')._replace(sts=0x10))
-    lines += [f'{count}.0 {"><"[count % 2]} '
-              f'{frames.message_frame(packet.encode(), Checksum.CRC).hex()}'
-              for count, packet in enumerate(said)]
-    path.write_text('\n'.join([*lines, '']), encoding='ascii')
+    path = write_capture(tmp_path / 'status.cap', [
+        ('><'[count % 2], frames.message_frame(packet.encode(), Checksum.CRC))
+        for count, packet in enumerate(said)], 1.0, ('check: CRC', 'duplex: full'))
     report = tmp_path / 'report.zip'
-    assert main([str(path), '--summary', '--report', str(report)]) == 0
+    assert main([path, '--summary', '--report', str(report)]) == 0
     text = unpacked(report)['processors.txt']
     assert [line.partition('; status ')[0] for line in text.splitlines()] == [
         'station 1: SLC 5/04 series B revision 3, RUN',
         'station 4: SLC 5/04 series B revision 3, RUN; major error 0x0000, processor halted; '
         'forces installed', 'station 5: ee (a diagnostic status of 1 bytes)',
         'station 6: unknown processor (EE 34)']
-    assert main([str(path), '--summary', '--report', str(report), '--anonymous']) == 0
+    assert main([path, '--summary', '--report', str(report), '--anonymous']) == 0
     told = unpacked(report)['processors.txt']
     assert 'EE' not in told.upper() and told.endswith('of 1 bytes\nstation 6: unknown processor\n')
     monkeypatch.setattr(sniff_report, 'MOST_ENTRIES', 1)
-    assert main([str(path), '--summary', '--report', str(report)]) == 0
+    assert main([path, '--summary', '--report', str(report)]) == 0
     files = unpacked(report)
     assert files['processors.txt'] == text
     assert files['entries.txt'].strip().startswith('11.000000 <')

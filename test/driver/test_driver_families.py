@@ -14,6 +14,8 @@
 
 """The driver against stations of every family."""
 
+from unittest.mock import Mock
+
 from abdf1_ros.driver.write import Outcome
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
@@ -90,20 +92,15 @@ def test_digits_of_a_plc2_timer_are_written_without_its_status_bits() -> None:
     bench = DriverBench([mapping])
     station = bench.plc(1, 'PLC2', *PLC2_WORDS)
     store(station, '030', [0xA123])
-    heard: list[bytes] = []
-
-    def hear(data: bytes) -> bytes:
-        heard.append(data)
-        return data
-
-    bench.far.hear = hear
+    heard = bench.far.hear = Mock(side_effect=bytes)
     bench.run(0.3)
     assert bench.listener.values(mapping)[-1] == [123]
     bench.write(mapping, [50], run=1.0)
     assert bench.listener.outcomes() == [Outcome.WRITTEN]
     assert stored(station, '030') == b'\x50\xA0'
     # Protected bit write: of byte 48 set 50 and reset AF, of byte 49 reset 0F (M 7-19).
-    assert bytes.fromhex('30 00 50 AF 31 00 00 0F') in b''.join(heard)
+    assert bytes.fromhex('30 00 50 AF 31 00 00 0F') in b''.join(
+        data for (data,), _ in heard.call_args_list)
 
 
 def test_common_interface_file_of_an_slc() -> None:
@@ -122,15 +119,9 @@ def test_common_interface_file_of_an_slc() -> None:
 def test_long_read_of_a_plc3_carries_its_offset() -> None:
     bench = DriverBench([make_mapping('E3.1.8.10.0.0', plc='PLC3', length=342, period=60_000)])
     bench.plc(1, 'PLC3', *PLC3_FILES)
-    heard: list[bytes] = []
-
-    def hear(data: bytes) -> bytes:
-        heard.append(data)
-        return data
-
-    bench.far.hear = hear
+    heard = bench.far.hear = Mock(side_effect=bytes)
     bench.run_until(lambda: bool(bench.listener.reads))
-    line = b''.join(heard)
+    line = b''.join(data for (data,), _ in heard.call_args_list)
     for offset, size in (('00', 'F4'), ('7A', 'F4'), ('F4', 'C4')):
         assert bytes.fromhex(f'01 {offset} 00 56 01 2C 08 0A 00 {size}') in line
 

@@ -16,9 +16,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.packet import Packet
@@ -31,6 +32,7 @@ from abdf1_ros.sniffer.traffic import TrafficDecoder
 from support.vectors import load_json, VECTOR_FOLDER
 
 FOLDER = VECTOR_FOLDER / 'captures'
+HALF_DUPLEX = ('baud: 9600', 'check: CRC', 'duplex: half')
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,3 +107,13 @@ CAPTURES = tuple(
     Capture(name, entry['client'], entry['server'], PlcType(entry['family']),
             Checksum(entry['check']), entry['words'], entry['replies'])
     for name, entry in load_json('captures/index.json').items())
+
+
+def write_capture(path: Path, said: Iterable[tuple[str, bytes]], step: float = 0.01,
+                  head: Iterable[str] = HALF_DUPLEX) -> str:
+    """Make a recording, of what was said each so many seconds; return its path."""
+    lines = ['abdf1_ros capture 1', *head]
+    path.write_text(''.join(f'# {line}\n' for line in lines) + ''.join(
+        f'{count * step:.6f} {way} {data.hex(" ")}\n'
+        for count, (way, data) in enumerate(said)), encoding='ascii')
+    return str(path)
