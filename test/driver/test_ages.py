@@ -91,6 +91,13 @@ def test_message_of_a_short_standstill_counts_from_its_begin() -> None:
         assert host_clock.least_age(now) == age
 
 
+def test_shorter_standstill_does_not_hide_a_longer_one_before() -> None:
+    host_clock = HostClock(0.5)
+    for now, age in ((1.0, 0.0), (6.0, 5.0), (6.125, 5.0), (6.5, 5.0), (6.75, 5.0), (6.875, 0.375),
+                     (7.0, 0.0)):
+        assert host_clock.least_age(now) == age
+
+
 def test_clock_here_that_is_set_back_makes_no_message_younger() -> None:
     host = Host()
     host.run(2.0)  # without a message

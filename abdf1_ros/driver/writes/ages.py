@@ -37,8 +37,8 @@ _SHARE = 4
 # many.
 REMEMBERED = 5.0
 
-# Longest time (s) between two looks of a running process. For _DRAINED seconds after a longer
-# pause, messages that come may have waited during the whole pause.
+# Longest time (s) between two looks of a running process. While it has run for less than _DRAINED
+# seconds after a longer pause, messages that come may have waited during the whole pause.
 _LOOKS = 0.25
 _DRAINED = 0.5
 
@@ -87,7 +87,8 @@ class HostClock:
     def __init__(self, patience: float) -> None:
         self.offsets = RecentMax(patience)
         self._looked = math.inf
-        self._length, self._ended = 0.0, -math.inf
+        self._ran = 0.0  # without pauses
+        self._pauses: list[tuple[float, float]] = []  # length, and ``_ran`` until which it counts
 
     def look(self, now: float, wall: float) -> None:
         """Take the values (s) of the clock that is never set, and of the clock of stamps."""
@@ -95,14 +96,17 @@ class HostClock:
         self.offsets.add(wall - now, now)
 
     def _see_pause(self, now: float) -> None:
-        if now - self._looked > _LOOKS:
-            self._length, self._ended = now - self._looked, now
-        self._looked = now
+        took, self._looked = now - self._looked, now
+        if took <= _LOOKS:
+            self._ran += max(0.0, took)
+            return
+        self._pauses = [*((length, until) for length, until in self._pauses
+                          if length > took and self._ran < until), (took, self._ran + _DRAINED)]
 
     def least_age(self, now: float) -> float:
         """Return the age (s) that a message received now may have, whatever its stamp."""
         self._see_pause(now)
-        return self._length if now < self._ended + _DRAINED else 0.0
+        return max((length for length, until in self._pauses if self._ran < until), default=0.0)
 
 
 class Ages:
