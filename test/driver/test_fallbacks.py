@@ -445,9 +445,11 @@ def test_rule_8_earliest_fallback_that_stands_of_a_station_that_is_not_busy_goes
 @pytest.mark.parametrize(('event', 'waits'), [
     ('', False), ('message', True), ('message after a failure', False),
     ('write of its words', True), ('silence', True), ('late replies', True)])
-def test_rule_8_fallback_that_stands_is_put_off(event: str, waits: bool) -> None:
+@pytest.mark.parametrize(('after', 'put_off'), [(0.5, 0.5), (60.0, 5.0)])
+def test_rule_8_fallback_that_stands_is_put_off(
+        event: str, waits: bool, after: float, put_off: float) -> None:
     one, stations = OneRow(), ActiveStationList([1], probe_time=1.0)
-    row = one.row
+    row, row.after = one.row, after
     plc = Plc(1, [row], stations, one.record, Conditions())
     row.make_due(FallbackCause.START, 0.0)
     one.fallback(row.take(0.0), 1.0)
@@ -458,8 +460,9 @@ def test_rule_8_fallback_that_stands_is_put_off(event: str, waits: bool) -> None
         stations.lost(1, 2.0)
     stations[1].overdue = 2 * (event == 'late replies')
     youngest = {one.mapping: 5.0} if 'message' in event else {}
-    assert plc.to_refresh(youngest, 6.25) is (None if waits else row)
-    assert row.refresh_at == (6.25 + row.after if waits else 6.0)
+    due = row.refresh_at
+    assert plc.to_refresh(youngest, due + 0.25) is (None if waits else row)
+    assert row.refresh_at == (due + 0.25 + put_off if waits else due)
 
 
 def test_rule_8_message_that_is_lost_with_the_port_is_not_waited_for() -> None:

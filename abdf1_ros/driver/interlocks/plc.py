@@ -32,6 +32,7 @@ from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackRow
 from abdf1_ros.driver.interlocks.heartbeat import HeartbeatRow
 from abdf1_ros.driver.record import Claim, WriteRecord
 from abdf1_ros.driver.write import Outcome
+from abdf1_ros.settings.heartbeats import LEAST_REFRESH
 from abdf1_ros.settings.mapping import Mapping
 
 # After this many unanswered writes in a row we treat the PLC as out of reach. Its station may
@@ -257,7 +258,7 @@ class Plc:
             if not is_put_off and self._record.may_begin(row.mapping) \
                     and self._stations[self.station].replies_in_time:
                 return row
-            row.refresh_at = now + row.after
+            row.refresh_at = now + min(row.after, LEAST_REFRESH)
         self.refresh_due = min(map(_refresh_of, standing), default=math.inf)
         return None
 
