@@ -147,7 +147,9 @@ class Accounting(Tally):
         may_answer = self._number in (None, reply.dst) and reply.src in self._stations
         self.counters.stale_messages += may_answer
         self.counters.invalid_messages += not may_answer
-        if may_answer and not is_local_status(reply.sts):
+        if may_answer and is_local_status(reply.sts):
+            self._stations.gateway_replied(reply.src)
+        elif may_answer:
             self._stations.heard(reply.src, now)
         self.report(wrong_message(reply, reply.src))
 
@@ -174,7 +176,8 @@ class Accounting(Tally):
             return
         local_status = reply.sts if reply.sts and is_local_status(reply.sts) else 0
         station = self._stations.records[number]
-        station.has_gateway |= local_status > 0
+        if local_status:
+            self._stations.gateway_replied(number)
         # A gateway may execute diagnostic commands itself, whatever node they are for.
         is_gateways = reply.cmd == DIAGNOSTIC_REPLY and not local_status and (
             station.local_status or number in self._stations.routes)

@@ -123,20 +123,22 @@ class ActiveStationList:
     station (M 3-7). While the gateway is inactive, all its stations are inactive. ``probes``
     decides when silent stations may be asked. A probe takes ``probe_time`` seconds; if no station
     answers, ``rest`` seconds pass between two probes. ``took`` returns for how much of the time
-    between two clock values (s) this process has run.
+    between two clock values (s) this process has run. ``on_gateway`` is called with the number of
+    a station when a gateway has first replied for it.
     """
 
     def __init__(self, numbers: Iterable[int] = (),
                  on_change: Callable[[Station], None] = lambda station: None,
                  routes: Mapping[int, int] | None = None, probe_time: float = 0.0,
                  took: Callable[[float, float], float] = lambda begun, now: now - begun,
-                 rest: float = 0.0) -> None:
+                 rest: float = 0.0,
+                 on_gateway: Callable[[int], None] = lambda number: None) -> None:
         self._polled: set[int] = set()
         self.probes = Probes(probe_time, rest)
         self._took = took
         self.records = _Records()
         self._stations: dict[int, Station] = {}
-        self._on_change = on_change
+        self._on_change, self._on_gateway = on_change, on_gateway
         self.routes = {station: gateway for station, gateway in (routes or {}).items()
                        if station != gateway}
         numbers = frozenset(numbers)
@@ -192,6 +194,13 @@ class ActiveStationList:
                 station.active, station.silent_since = True, None
                 station.returns += 1
                 self._tell(station)
+
+    def gateway_replied(self, number: int) -> None:
+        """Record that a gateway has replied for a station."""
+        station = self.records[number]
+        was_known, station.has_gateway = station.has_gateway, True
+        if not was_known:
+            self._on_gateway(number)
 
     def lost(self, number: int, now: float) -> None:
         """Make a station inactive; if it is a gateway, also all stations behind it."""

@@ -113,10 +113,12 @@ class Driver:
         self.counters = Counters()
         self.machine = network.line_mode.make_machine(
             network.line, self._run, self.counters, self)
+        self._record = WriteRecord(self.machine, 2 * network.cmd_timeout / 1000)
         self.stations = ActiveStationList(
             self.mappings.stations, self._station_changed,
             _routes(network, mappings), network.line_mode.longest_probe(network.line),
-            self.machine.took, QUESTION_PERIOD if settings.may_store else 0.0)
+            self.machine.took, QUESTION_PERIOD if settings.may_store else 0.0,
+            self._record.gateway_replied)
         # Only a gateway answers for several stations in full duplex.
         are_behind = network.line_mode.has_one_plc and len(self.mappings.stations) > 1
         for row in self.mappings.of_plcs:
@@ -136,8 +138,7 @@ class Driver:
     def _make_queues(self) -> None:
         """Make the queues of jobs, and the agenda that decides between them."""
         network, settings, machine = self.network, self._settings, self.machine
-        report = self._listener.written
-        self._record = record = WriteRecord(machine, 2 * network.cmd_timeout / 1000)
+        record, report = self._record, self._listener.written
         self.readings = Readings(
             network, self._active_rows(), settings, self.stations, machine, self._listener, record)
         self.points = self.readings.points

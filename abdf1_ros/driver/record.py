@@ -117,8 +117,13 @@ class Claim:
 class WriteListener:
     """A listener to all writes; methods that are not overridden do nothing."""
 
-    def opened(self, stations: Container[int], until: float) -> None:
-        """Take the stations whose gateways may hold earlier writes, and until when (clock, s)."""
+    def earlier_may_land(self, stations: Container[int], until: float) -> None:
+        """
+        Take the stations whose gateways may hold writes from before the port was opened.
+
+        These writes may land until ``until`` (clock value, s). It may have passed already where a
+        gateway shows itself late.
+        """
 
     def write_begins(self, claim: Claim) -> None:
         """Take a write that now has the line."""
@@ -177,6 +182,12 @@ class OwnWords:
         until = min(self.lands_until, self._latest)
         self.again_at = until if tried < until else math.inf
 
+    def earlier_may_land(self) -> None:
+        """Plan a second write if one from before the port was opened may have landed since."""
+        until = self._lands_until.get((_Writer.ANYBODY,), math.inf)
+        if until < math.inf:
+            self.again_at = min(self.again_at, until, self._latest)
+
     def try_again(self, when: float, now: float) -> None:
         """Plan another write after a failed one, unless a second write is planned (rule 10)."""
         if not now < self.again_at < math.inf:
@@ -225,6 +236,7 @@ class WriteRecord:
         self.line = line
         self._settle_time = settle_time
         self._stations = ActiveStationList()
+        self._opened_until = -math.inf
         self._under_way: list[Claim] = []
         self._late: list[Claim] = []  # have ended, and may land; for equal words the last one
         self._words: dict[Mapping, OwnWords] = {}
@@ -243,11 +255,17 @@ class WriteRecord:
     def opened(self, stations: ActiveStationList) -> None:
         """Record that gateways may hold earlier writes: the port has been opened."""
         behind = {station.number for station in stations if station.has_gateway}
-        until, self._stations = self.line.now + self._settle_time, stations
+        until = self._opened_until = self.line.now + self._settle_time
+        self._stations = stations
         for words in self._words.values():  # a gateway may show itself later
             words.may_land((_Writer.ANYBODY,), until)
         for listener in self._listeners:
-            listener.opened(behind, until)
+            listener.earlier_may_land(behind, until)
+
+    def gateway_replied(self, station: int) -> None:
+        """Record that a station turned out to be behind a gateway after the port was opened."""
+        for listener in self._listeners:
+            listener.earlier_may_land({station}, self._opened_until)
 
     def take_over(self, before: WriteRecord) -> None:
         """Take the writes of the record before that may still land, also of rows that are gone."""

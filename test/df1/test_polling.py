@@ -241,7 +241,7 @@ def test_command_that_was_late_for_its_poll_is_executed_when_it_comes_again() ->
     assert rig.master.served == [message]
 
 
-def test_late_error_reply_of_a_gateway_says_nothing_of_the_station_behind_it() -> None:
+def test_late_error_reply_of_a_gateway_does_not_prove_the_station_behind_it() -> None:
     rig = bench(PollingSettings((1, 2)), dead=(2,))
     rig.master.stations.routes[3] = 1
     rig.master.stations.add((3,))
@@ -250,7 +250,8 @@ def test_late_error_reply_of_a_gateway_says_nothing_of_the_station_behind_it() -
     late = message_frame(Packet(5, 3, 0x4F, 0x02, 0x77).encode(), Checksum.CRC)
     rig.master.machine.receive_data(late, rig.clock() + 0.05)
     assert rig.master.stations[1].last_heard == rig.clock() + 0.05
-    assert not rig.master.stations[3].active
+    behind = rig.master.stations[3]
+    assert (behind.active, behind.has_gateway) == (False, True)
 
 
 def test_reply_to_a_guest_that_cannot_be_fetched_does_not_make_its_station_inactive() -> None:

@@ -86,17 +86,24 @@ def test_rule_5_what_may_still_land_after_the_end_is_named() -> None:
     assert 0.0 < float(left.removesuffix(' s)')) <= 20.0
 
 
-@pytest.mark.parametrize('is_gateway', [True, False])
+@pytest.mark.parametrize(('shown_by', 'when'), [
+    ('the first try', 0.9), ('a guest', 0.3), ('a guest', 3.0), ('nothing', 0.9)])
 def test_rule_10_gateway_that_shows_itself_after_the_port_was_opened_may_hold_an_earlier_command(
-        is_gateway: bool) -> None:
-    cell = Cell(speed_row(Fallback((7,), 60_000)), start=False)
-    tries = count(not is_gateway)
-    cell.is_undelivered = lambda command: command.data.endswith(b'\7\0') and not next(tries)
-    cell.bench.open(run=0.9)  # the second try is confirmed long before
+        shown_by: str, when: float) -> None:
+    cell = GuestCell(speed_row(Fallback((7,), 60_000)), beat_row(60_000, ('speed',), 300),
+                     start=False)
+    tries = count(shown_by != 'the first try')
+    cell.is_undelivered = lambda command: (
+        command.data.endswith(b'\x63\0') or command.data.endswith(b'\7\0') and not next(tries))
+    cell.bench.open(run=when)  # both are confirmed before
     assert cell.results() == [START]
-    store(cell.plc, 'N7:0', [800])  # it has let it go
-    cell.run(0.2)
-    assert cell.word('N7:0') == (7 if is_gateway else 800)
+    for text in WORDS:
+        store(cell.plc, text, [800])  # it has let it go
+    if shown_by == 'a guest':
+        cell.ask('N11:0', 99)
+    cell.run(0.9)
+    expected = [800, 800] if shown_by == 'nothing' else [7, 0]
+    assert [cell.word(text) for text in WORDS] == expected
 
 
 @pytest.mark.parametrize('dst', [1, 255])

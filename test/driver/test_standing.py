@@ -15,6 +15,7 @@
 """Write_Again: a message is not written again while reads show that its value stands."""
 
 from collections.abc import Sequence
+from functools import partial
 from itertools import pairwise
 import math
 
@@ -235,9 +236,14 @@ def test_unconfirmed_write_may_land_over_the_confirmed_one_that_follows() -> Non
         assert bool(standing.proof(last, 8.4)) is is_kept
     before = Claim(1, [WORD.extent])  # the driver before ~/reload
     before.end(Outcome.UNKNOWN, 9.0, 1.0)
-    standing.may_land(before)
-    for begun, is_settled in ((9.9, False), (10.0, True)):
-        assert bool(standing.proof(end(9, begun, WRITTEN, 0.0), begun + 0.2)) is is_settled
+    for settled, may_land in ((10.0, partial(standing.may_land, before)),
+                              (11.0, partial(standing.earlier_may_land, {1}, 11.0))):
+        may_land()
+        assert not standing.proof(last, settled - 1.0)
+        last = end(9, settled - 0.1, WRITTEN, 0.0)
+        assert not standing.proof(last, settled)
+        last = end(9, settled, WRITTEN, 0.0)
+        assert standing.proof(last, settled + 0.2)
 
 
 def test_write_that_has_ended_may_have_changed_words_unless_it_cannot_land() -> None:

@@ -161,6 +161,13 @@ class Interlocks(WriteListener):
             plc.contact(now, is_new=True)
         self.ours.plan()
 
+    def earlier_may_land(self, stations: Container[int], until: float) -> None:
+        """Write again what such a write may have replaced, also where it has just shown (10)."""
+        for row, plc in self._plc_of.items():
+            if plc.station in stations and row.is_confirmed:
+                row.words.earlier_may_land()
+                plc.look_again(row)
+
     def forget_served(self) -> None:
         """Serve 0, or the fallback of a row: other bridges may take messages from now on."""
         self._served.clear()

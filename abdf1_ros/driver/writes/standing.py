@@ -59,9 +59,11 @@ class Standing(WriteListener):
         self._settled: dict[Mapping, float] = {}  # no other write can land after it (clock, s)
         self._sharing: dict[Mapping, list[Mapping]] = {}  # cached, as it takes long to find out
 
-    def opened(self, stations: Container[int], until: float) -> None:
+    def earlier_may_land(self, stations: Container[int], until: float) -> None:
         """Record no value of these stations before all writes of earlier times have landed."""
-        self._settled |= {row: until for row in self._patience if row.station in stations}
+        for row in self._patience:
+            if row.station in stations:
+                self._unsettle(row, until)
 
     def write_begins(self, claim: Claim) -> None:
         """Forget the values that a write may change."""
@@ -71,13 +73,13 @@ class Standing(WriteListener):
     def write_ended(self, claim: Claim) -> None:
         """Take the value of a confirmed message; forget all values that the write may change."""
         for row in self._disturbed(claim):
-            self._unsettle(row, claim)
+            self._unsettle(row, claim.lands_until)
         write, now = claim.write, claim.done
         if write is None or write.is_own or write.mapping not in self._patience:
             return
         row = write.mapping
         if claim.outcome is not Outcome.WRITTEN:
-            self._unsettle(row, claim)
+            self._unsettle(row, claim.lands_until)
         elif row in self._values:
             self._values[row].confirmed = now
         elif claim.begun >= self._settled.get(row, -math.inf):
@@ -87,12 +89,12 @@ class Standing(WriteListener):
         """Record no value of the words before a write of the driver before has landed."""
         for row in self._patience:
             if claim.meets(row.extent):
-                self._unsettle(row, claim)
+                self._unsettle(row, claim.lands_until)
 
-    def _unsettle(self, row: Mapping, claim: Claim) -> None:
-        """Forget the value of a row; record no new one before the write has landed for certain."""
+    def _unsettle(self, row: Mapping, until: float) -> None:
+        """Forget the value of a row; record none before ``until``, when a write has landed."""
         self._values.pop(row, None)
-        self._settled[row] = max(claim.lands_until, self._settled.get(row, -math.inf))
+        self._settled[row] = max(until, self._settled.get(row, -math.inf))
 
     def _disturbed(self, claim: Claim) -> list[Mapping]:
         """Return the rows whose known value a write may replace by another value."""
