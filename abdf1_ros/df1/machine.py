@@ -32,6 +32,7 @@ driving loop (a thread with a port, or a test with a virtual line) does this::
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Generator
 from contextlib import suppress
 from dataclasses import dataclass
@@ -129,6 +130,9 @@ MIN_RESPONSE_TIME = 0.02
 # If a call comes this late (s) after a deadline, the process or its host was paused. The age of
 # the bytes read next is then unknown.
 MOST_LATE = 0.2
+
+# Pauses of the process that are remembered, more than come in one transaction.
+_MOST_PAUSES = 20
 
 # After a longer pause of this process (s) the sender of a command may have given the command up.
 _PATIENCE_OF_SENDERS = 1.0
@@ -242,7 +246,8 @@ class Machine:
         self.deadline: float | None = None
         self.late = 0.0
         self.is_behind = False
-        self._last_pause = -math.inf, 0.0  # its end, and its seconds
+        # of the last pauses, the end and the seconds
+        self._pauses = deque[tuple[float, float]](maxlen=_MOST_PAUSES)
         self._old_until = -math.inf
         self._senders_patience = senders_patience
         self._background = background
@@ -414,7 +419,7 @@ class Machine:
             return
         if (seconds := now - self.deadline) > MOST_LATE:
             self.late += seconds
-            self._last_pause = now, seconds
+            self._pauses.append((now, seconds))
             if seconds > self._senders_patience:
                 self.treat_as_old()
         step = self._step
@@ -433,9 +438,8 @@ class Machine:
         return True
 
     def took(self, begun: float, now: float) -> float:
-        """Return the seconds from a clock value to now, without the last pause of the process."""
-        end, seconds = self._last_pause
-        return now - begun - (seconds if end > begun else 0.0)
+        """Return the seconds from a clock value to now, without pauses of the process."""
+        return now - begun - sum(seconds for end, seconds in self._pauses if end > begun)
 
     def wake(self, now: float) -> None:
         """End a rest early: there may be something new to do."""
