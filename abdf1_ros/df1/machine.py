@@ -407,6 +407,7 @@ class Machine:
     def handle_timeout(self, now: float) -> None:
         """Do what is due when the clock reads ``now``; nothing before ``next_call``."""
         self.now = now
+        self._note_pause(now)
         has_expired = self._expire(now)
         due = self.sender.outgoing.due
         if due is not None and now >= due:
@@ -417,11 +418,6 @@ class Machine:
             if has_expired:  # what waited for it may go out now
                 self._end_rest()
             return
-        if (seconds := now - self.deadline) > MOST_LATE:
-            self.late += seconds
-            self._pauses.append((now, seconds))
-            if seconds > self._senders_patience:
-                self.treat_as_old()
         step = self._step
         if isinstance(step, Send) and not self._is_listening:  # its delay is over
             self._transmit(step)
@@ -429,6 +425,14 @@ class Machine:
             decoder = self.decoder
             self._resume(Silence(decoder.last_byte, decoder.in_message, now - self._last_heard))
         self._deliver_symbols()
+
+    def _note_pause(self, now: float) -> None:
+        """Record a pause of the process, before anything sets another deadline."""
+        if self.deadline is not None and (seconds := now - self.deadline) > MOST_LATE:
+            self.late += seconds
+            self._pauses.append((now, seconds))
+            if seconds > self._senders_patience:
+                self.treat_as_old()
 
     def _expire(self, now: float) -> bool:
         """Do the work that needs no line; return True if there was some."""

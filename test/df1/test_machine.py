@@ -569,6 +569,10 @@ def test_lateness_is_what_the_machine_is_called_after_its_deadlines() -> None:
     now = bench.machine.now
     took = [bench.machine.took(begun, begun + 5.0) for begun in (0.0, 1.25, now)]
     assert took == [2.75, 3.0, 5.0]  # two pauses, one, none
+    inside = Bench(*2 * [Rest(1.0)], duplex=Duplex.FULL)
+    inside.machine.receive_data(MESSAGE[:9], 0.5)
+    inside.machine.handle_timeout(3.0)  # this message has stopped meanwhile
+    assert (inside.machine.late, inside.machine.may_be_old) == (2.0, True)
     bench.machine.handle_timeout(6.125)  # no wait is exact
     assert bench.machine.late == 2.25
 
