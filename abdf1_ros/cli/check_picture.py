@@ -72,7 +72,7 @@ class _Picture:
         self.late = [block for block in report.blocks if self._is_late(block)]
 
     def _is_late(self, block: Block) -> bool:
-        return 0 < block.period < 0.999 * self._expected.get(block.period, 0.0)
+        return 0 < block.period < 0.999 * self._expected.get(block, 0.0)
 
     def verdict(self) -> str:
         report = self.report
@@ -128,7 +128,7 @@ class _Picture:
 
     def _title(self, block: Block) -> str:
         wanted = f'Period {milliseconds(block.period)}' if block.period else 'Period 0'
-        expected = self._expected.get(block.period)
+        expected = self._expected.get(block)
         late = f', expected {milliseconds(expected)}' if self._is_late(block) else ''
         return (f'station {block.station}, {_labels(block)[0]}: {counted(block.words, "word")} in '
                 f'{milliseconds(self.report.time(block), 1)}; {wanted}{late}; '
@@ -137,7 +137,7 @@ class _Picture:
     def table(self) -> str:
         rows = []
         for block in self.report.blocks:
-            expected = self._expected.get(block.period)
+            expected = self._expected.get(block)
             told = '' if expected is None else f'{expected * 1000:.0f}'
             if self._is_late(block):
                 told = f'<b class="is-bad">{told}</b>'

@@ -107,6 +107,10 @@ class LineMode:
         """Return how long a command usually waits for a quiet line."""
         return 0.0
 
+    def idle_poll(self, line: LinkSettings) -> float:
+        """Return the time of a poll without a reply where stations take turns, elsewhere 0."""
+        return 0.0
+
     def most_under_way(self, line: LinkSettings) -> int:
         """Return how many stations may work on their replies at a time."""
         return 1

@@ -399,6 +399,10 @@ class StandardPollingMode(MasterMode):
         return StandardPollingMaster(
             machine, replace(line, polling=polling), stations, serve, report)
 
+    def idle_poll(self, line: LinkSettings) -> float:
+        """Return the time of a poll and of the EOT that answers it at once."""
+        return _POLL_CHARACTERS * line.timing.char_time + line.timing.tx_delay
+
     def longest_transaction(self, line: LinkSettings, frames: float, others: float = 0.0,
                             stations: int = 0) -> float:
         """Return the time of message-based polling, plus the time of all other stations."""
@@ -419,7 +423,7 @@ class StandardPollingMode(MasterMode):
     def undisturbed(self, line: LinkSettings, frames: float, response_time: float,
                     others: float = 0.0, stations: int = 0) -> float:
         """Return the time of message-based polling, plus a scan that serves every station."""
-        poll = _POLL_CHARACTERS * line.timing.char_time + line.timing.tx_delay + response_time
+        poll = self.idle_poll(line) + response_time
         other = super().undisturbed(line, others, response_time)
         return super().undisturbed(line, frames, response_time) + stations * (poll + other)
 

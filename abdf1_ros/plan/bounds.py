@@ -389,9 +389,9 @@ def _packets(model: LineModel, mapping: Mapping, dialect: Dialect) -> list[float
 
 def own_work(model: LineModel, mappings: Rows, default_period: float,
              stale_after: float = forecast.USUAL_STALE_AFTER,
-             response_time: float = forecast.USUAL_RESPONSE_TIME) -> list[tuple[float, float]]:
+             response_time: float = forecast.USUAL_RESPONSE_TIME) -> list[forecast.OwnCommand]:
     """
-    Return the seconds and the period (s) of each command that goes between the reads.
+    Return the commands that go between the reads.
 
     These are heartbeats, questions for a mode, and fallbacks that stand and are written again.
     """
@@ -399,11 +399,11 @@ def own_work(model: LineModel, mappings: Rows, default_period: float,
     periods = {mapping: mapping.period / 1000 for mapping in mappings.heartbeats if mapping.period}
     periods |= {mapping: max(mapping.fallback.after / 1000, LEAST_REFRESH)
                 for mapping in mappings.fallbacks if mapping.fallback and not mapping.serves}
-    return [*((_with_answers([packet], response_time), period)
+    return [*(forecast.OwnCommand(_with_answers([packet], response_time), period, mapping.station)
               for mapping, period in periods.items()
               for packet in _packets(model, mapping, mapping.dialect)),
-            *((question, period) for period in
-              mode_periods(mappings, default_period, stale_after).values())]
+            *(forecast.OwnCommand(question, period, station) for station, period in
+              mode_periods(mappings, default_period, stale_after).items())]
 
 
 def mode_periods(mappings: Rows, default_period: float, stale_after: float) -> dict[int, float]:
@@ -460,8 +460,8 @@ def guard_faults(model: LineModel, mappings: Rows,
     counters = {mapping: (condition.names[0], condition.timeout) for mapping in mappings.guarded
                 if (condition := mapping.condition) and condition.timeout is not None}
     blocks = Planner(model, default_period).plan(mappings.repeated) if counters else []
-    expected = forecast.intervals(blocks, own_work(model, mappings, default_period))
-    found = {mapping.tag: expected[block.period] for block in blocks for mapping in block.mappings}
+    expected = forecast.intervals(model, blocks, own_work(model, mappings, default_period))
+    found = {mapping.tag: expected[block] for block in blocks for mapping in block.mappings}
     for mapping, (tag, timeout) in counters.items():
         needed = math.ceil(round(1000 * READS_IN_TIME * found.get(tag, 0.0), 6))
         if timeout < needed:

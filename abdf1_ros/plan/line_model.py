@@ -34,12 +34,18 @@ from abdf1_ros.pccc.dialect import Dialect, Transfer
 
 @dataclass(frozen=True, slots=True)
 class LineModel:
-    """A line with this check, discipline and timing; ``wait`` is the pause (s) before commands."""
+    """
+    A line with this check, discipline and timing.
+
+    ``wait`` is the pause (s) before commands. Where stations take turns, ``idle_poll`` is the time
+    (s) of a poll without a reply, elsewhere 0.
+    """
 
     checksum: Checksum
     duplex: Duplex
     timing: LineTiming
     wait: float = 0.0
+    idle_poll: float = 0.0
 
     def read_time(self, dialect: Dialect, request: Transfer, station: int = 0) -> float:
         """Return the seconds of a read from a station that answers at once."""

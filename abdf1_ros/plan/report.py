@@ -104,14 +104,15 @@ class Report:
     def load(self) -> float:
         """Return the part of the line's time that the periods need."""
         return forecast.load(self.blocks, self._answer_time) + sum(
-            seconds / period for seconds, period in self._own_work)
+            own.seconds / own.period for own in self._own_work)
 
-    def intervals(self) -> dict[float, float]:
-        """Return the expected seconds between two reads of a block, by its period (s)."""
-        return forecast.intervals(self.blocks, self._own_work, self._answer_time)
+    def intervals(self) -> dict[Block, float]:
+        """Return the expected seconds between two reads of each block."""
+        return forecast.intervals(forecast.line_model(self.network), self.blocks, self._own_work,
+                                  self._answer_time)
 
     @property
-    def _own_work(self) -> list[tuple[float, float]]:
+    def _own_work(self) -> list[forecast.OwnCommand]:
         return bounds.own_work(
             forecast.line_model(self.network), self.mappings, self.default_period,
             response_time=self._answer_time)
@@ -128,9 +129,10 @@ class Report:
     def promises(self) -> dict[Mapping, float]:
         """Return the deadline (s) of the topic of each row that we read, if it has one."""
         # The node promises the same time, however long a PLC really takes to answer.
+        line = forecast.line_model(self.network)
         stale = forecast.stale_times(
-            self.blocks, self.default_period, forecast.USUAL_STALE_AFTER, bounds.own_work(
-                forecast.line_model(self.network), self.mappings, self.default_period),
+            line, self.blocks, self.default_period, forecast.USUAL_STALE_AFTER,
+            bounds.own_work(line, self.mappings, self.default_period),
             is_heard=self.network.line_mode.only_listens)
         return {mapping: promise for mapping, time in stale.items()
                 if math.isfinite(promise := mapping.promise(time))}
@@ -404,7 +406,7 @@ def _again_remarks(report: Report) -> Iterator[Remark]:
     for row in report.mappings:
         if row.write_again is None:
             continue
-        reads = [expected[block.period] for block in report.blocks
+        reads = [expected[block] for block in report.blocks
                  if block.extent.holds(row.extent)]
         least, which = min((row.write_again, 'Write_Again'), (
             (row.fallback.after, 'Fallback_After') if row.fallback

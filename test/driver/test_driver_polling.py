@@ -16,16 +16,19 @@
 
 from unittest.mock import Mock
 
+from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.polling import StandardPollingMaster
 from abdf1_ros.df1.settings import PollingSettings
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome
+from abdf1_ros.plan.forecast import longest_wait, USUAL_RESPONSE_TIME
 from abdf1_ros.settings.network import Network, POLLING_MODES
+from abdf1_ros.simulator.gateway import SimulatedGateway
 from abdf1_ros.simulator.simulated_plc import InjectedFaults
 import pytest
 from support.cases import for_all
-from support.driver_bench import DriverBench, store, stored
+from support.driver_bench import DriverBench, simulated_plc, store, stored
 from support.mappings import load_rows, make_mapping
 
 STANDARD = Network(baud=115200, timeout=200, polling='Standard')
@@ -126,6 +129,30 @@ def test_mapped_station_that_is_in_no_list_is_polled_all_the_same() -> None:
     assert len(bench.listener.values(read)) > 20
     polls = b''.join(data for (data,), _ in heard.call_args_list).split(b'\x10\x05')
     assert [poll[0] for poll in polls[1:7]] == [3, 4, 1, 15, 6, 3]  # rows by number
+
+
+@pytest.mark.parametrize(('count', 'length', 'behind', 'others'), [
+    (5, 30, (), (2,)), (1, 600, (), (2,)), (3, 9, (6, 7), (2, 3))])
+def test_station_with_many_packets_gets_one_in_a_scan_and_its_stale_times_allow_for_it(
+        count: int, length: int, behind: tuple[int, ...], others: tuple[int, ...]) -> None:
+    rows = [make_mapping(f'N{number}:0', station=station, length=length, period=500,
+                         via=9 if behind else None)
+            for station in behind or (1,) for number in NUMBERS[:count]]
+    rows += [make_mapping('N7:0', station=station, length=min(length, 100), period=500)
+             for station in others]
+    bench = DriverBench(rows, network=Network(baud=9600, station=20, polling='Standard'))
+    bench.line.propagation = USUAL_RESPONSE_TIME / 2
+    areas = [(f'N{number}:0', length) for number in NUMBERS[:count]]
+    bench.connect(SimulatedGateway(9, [
+        simulated_plc(station, 'PLC5', bench.clock, *areas) for station in behind], Checksum.CRC))
+    for station in (1, *others):
+        bench.plc(station, 'PLC5', *areas)
+    times = bench.listener.times
+    bench.run_until(lambda: all(len(times(row)) > 3 for row in rows))
+    wait = longest_wait(bench.driver.readings.blocks)
+    for row in rows:
+        interval = (times(row)[-1] - times(row)[1]) / (len(times(row)) - 2)
+        assert bench.driver.points[row].stale_time == pytest.approx(3 * interval + wait, rel=0.1)
 
 
 @pytest.mark.parametrize('others', [0, 19])

@@ -159,9 +159,9 @@ def test_reads_without_a_period_take_what_the_others_leave() -> None:
                        st.integers(1, 25), min_size=1, max_size=3))
 def test_forecast_is_what_comes(periods: dict[int, int]) -> None:
     jobs = [make_job(period) for period, count in periods.items() for _ in range(count)]
-    expected = intervals([job.block for job in jobs])
+    expected = intervals(LINE, [job.block for job in jobs])
     for period, means in mean_intervals(periods, 40.0).items():
-        assert max(means) <= 2 * 1000 * (expected[period / 1000] + TOOK)
+        assert max(means) <= 2 * 1000 * (expected[make_job(period).block] + TOOK)
 
 
 def test_job_that_is_put_again_is_there_once() -> None:

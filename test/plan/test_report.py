@@ -21,6 +21,7 @@ from abdf1_ros.plan.forecast import (
     intervals,
     line_model,
     load,
+    OwnCommand,
     PATIENCE,
     poll_cycle,
     stale_times,
@@ -177,7 +178,8 @@ def test_plcs_of_a_radio_network_work_on_their_answers_at_a_time() -> None:
                              tx_delay=delay) for response, delay in ((0.0, 0), (1.0, 5)))
     assert slow.poll_cycle == pytest.approx(quick.poll_cycle + 3 * 0.51)  # half of 1 s, 2 * 5 ms
     # Four reads a second, a heartbeat, and half a question for the mode.
-    assert slow.load == pytest.approx(quick.load + 5.5 * 0.51) == slow.intervals()[1.0]
+    assert slow.load == pytest.approx(quick.load + 5.5 * 0.51)
+    assert slow.load in slow.intervals().values()  # of the rows with a Period of 1 s
 
 
 def test_guarded_rows_of_a_full_line_are_named() -> None:
@@ -325,8 +327,9 @@ def test_rows_promise_three_intervals_and_a_read() -> None:
     assert report_of(row, rare).promises()[rare] == pytest.approx(
         3.6 + TWO_WORDS + 2 * CHARACTER + ANSWERS)
     busy = report_of(row, beat)  # of the heartbeat nobody is promised anything
-    assert busy.promises() == {row: pytest.approx(3 * busy.intervals()[1.0] + TWO_WORDS + ANSWERS)}
-    assert busy.intervals()[1.0] > 1.2
+    interval = next(time for block, time in busy.intervals().items() if row in block.mappings)
+    assert busy.promises() == {row: pytest.approx(3 * interval + TWO_WORDS + ANSWERS)}
+    assert interval > 1.2
     guarded = make_mapping('B3:0', period=200, condition=While(('RUN',)))
     fast, slow = report_of(row, guarded), report_of(row, guarded, response=0.1)
     # The node does not know how slow the PLC is, and so promises the same.
@@ -399,13 +402,14 @@ def test_load_is_what_periods_need_and_leaves_out_those_without() -> None:
     assert load(blocks_of(NETWORK), 0.01) == pytest.approx(times[0.5] / 0.5 + times[2.0] / 2)
 
 
-def expected(*rows: tuple[int, int], own: tuple[tuple[float, float], ...] = (),
-             ) -> tuple[dict[float, float], float]:
+def expected(*rows: tuple[int, int], own: tuple[OwnCommand, ...] = (),
+             network: Network = NETWORK) -> tuple[dict[float, float], float]:
     """Return the intervals for so many reads of a period (ms) each, and the time of one."""
     mappings = [make_mapping(f'N{9 + 20 * group + number}:0', period=period)
                 for group, (period, count) in enumerate(rows) for number in range(count)]
-    blocks = Planner(line_model(NETWORK), 0.1).plan(mappings)
-    return intervals(blocks, own), block_time(blocks[0])
+    blocks = Planner(line_model(network), 0.1).plan(mappings)
+    found = intervals(line_model(network), blocks, own)
+    return {block.period: time for block, time in found.items()}, block_time(blocks[0])
 
 
 def test_periods_are_longer_by_the_load_of_the_line_but_by_no_more_than_a_scan() -> None:
@@ -417,16 +421,29 @@ def test_periods_are_longer_by_the_load_of_the_line_but_by_no_more_than_a_scan()
     found, time = expected((10, 10), (1000, 1))
     assert found[0.01] == pytest.approx(0.01 * (10 * time / 0.01 + time / 1.0), rel=0.01)
     assert found[1.0] == pytest.approx(1.0 + 11 * time, rel=0.01)
-    found, time = expected((1000, 1), own=((0.5, 0.1),))
+    found, time = expected((1000, 1), own=(OwnCommand(0.5, 0.1),))
     assert found == {1.0: pytest.approx(1.0 + time + 0.5)}
+
+
+def test_own_commands_go_before_the_reads_of_a_station_that_is_polled_in_turn() -> None:
+    standard = replace(NETWORK, polling='Standard')
+    _, time = expected((100, 1))  # a scan of one station that has a command each time
+    found, _ = expected((100, 3), own=(OwnCommand(time, 1.0, 1),), network=standard)
+    assert found == {0.1: pytest.approx(3 * time / (1 - time))}
+    found, _ = expected((100, 3), own=(OwnCommand(time, 0.01, 1),), network=standard)
+    assert found == {0.1: pytest.approx(0.1 + 4 * time)}
+    found, _ = expected((0, 2), (1000, 1), network=standard)
+    assert found == {0.0: pytest.approx(2 * time / (1 - time)), 1.0: 1.0}
 
 
 @for_all(('count', 'between'), [(0, 0.5), (1, 0.6), (2, 0.9), (9, 1.8)])
 def test_stale_time_has_room_for_one_own_command_after_each_read(
         count: int, between: float) -> None:
-    blocks = Planner(line_model(Network(baud=115200)), 0.25).plan([
+    line = line_model(Network(baud=115200))
+    blocks = Planner(line, 0.25).plan([
         make_mapping('N7:0'), make_mapping('N9:0', length=120)])  # three reads
-    found = stale_times(blocks, 0.25, 3.0, [(0.6, 100.0), *[(0.3, 100.0)] * 8][:count])
+    own = [OwnCommand(0.6, 100.0), *[OwnCommand(0.3, 100.0)] * 8]
+    found = stale_times(line, blocks, 0.25, 3.0, own[:count])
     assert [*found.values()] == 2 * [pytest.approx(
         0.25 + between + max(blocks[1].line_times) + ANSWERS)]
 
@@ -437,7 +454,7 @@ def test_reads_without_a_period_are_expected_to_have_what_is_left() -> None:
     assert found == {0.0: pytest.approx(2 * time / left), 0.5: 0.5}
     found, time = expected((0, 2))
     assert found == {0.0: pytest.approx(2 * time)}
-    found, _ = expected((0, 2), own=((0.5, 0.5),))  # which leave nothing
+    found, _ = expected((0, 2), own=(OwnCommand(0.5, 0.5),))  # which leave nothing
     assert found == {0.0: pytest.approx(10 * time)}
 
 

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable
 from collections.abc import Mapping as MappingType
 import math
 from typing import Protocol
@@ -92,9 +92,10 @@ class Readings:
         self.guards = Guards()
         times = settings.default_period, settings.stale_after
         self.mode_periods = mode_periods(mappings, *times)
-        self.points = _points(mappings, blocks, settings, self.guards,
-                              own_work(self.planner.line_model, mappings, *times),
-                              is_heard=network.line_mode.only_listens)
+        line_of_plan = self.planner.line_model
+        stale = stale_times(line_of_plan, blocks, *times, own_work(line_of_plan, mappings, *times),
+                            is_heard=network.line_mode.only_listens)
+        self.points = _points(mappings, stale, settings, self.guards)
         self.reads = Reads(stations)
         self.demands = ReadCalls(settings.write_timeout)
         self.expected_poll_cycle = poll_cycle(blocks, answer_time(network, blocks))
@@ -334,12 +335,10 @@ def _fail_periodic(points: Iterable[ReadPoint], reason: str) -> None:
             point.fail(reason)
 
 
-def _points(mappings: Rows, blocks: Sequence[Block], settings: DriverSettings, guards: Guards,
-            own: Sequence[tuple[float, float]], *,
-            is_heard: bool) -> dict[Mapping, ReadPoint]:
+def _points(mappings: Rows, stale: dict[Mapping, float], settings: DriverSettings,
+            guards: Guards) -> dict[Mapping, ReadPoint]:
     """Return the points of all mappings that are published, in their order."""
     default = settings.default_period
-    stale = stale_times(blocks, default, settings.stale_after, own, is_heard=is_heard)
     # A row on demand is never stale, but the mode for While RUN may be.
     stale |= {mapping: settings.stale_after * period_of(mapping, default)
               for mapping in mappings.on_demand}
