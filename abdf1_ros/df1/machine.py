@@ -407,7 +407,9 @@ class Machine:
     def handle_timeout(self, now: float) -> None:
         """Do what is due when the clock reads ``now``; nothing before ``next_call``."""
         self.now = now
-        self._note_pause(now)
+        # first, before anything sets another deadline
+        if self.deadline is not None and now - self.deadline > MOST_LATE:
+            self._note_pause(now, now - self.deadline)
         has_expired = self._expire(now)
         due = self.sender.outgoing.due
         if due is not None and now >= due:
@@ -426,13 +428,12 @@ class Machine:
             self._resume(Silence(decoder.last_byte, decoder.in_message, now - self._last_heard))
         self._deliver_symbols()
 
-    def _note_pause(self, now: float) -> None:
-        """Record a pause of the process, before anything sets another deadline."""
-        if self.deadline is not None and (seconds := now - self.deadline) > MOST_LATE:
-            self.late += seconds
-            self._pauses.append((now, seconds))
-            if seconds > self._senders_patience:
-                self.treat_as_old()
+    def _note_pause(self, now: float, seconds: float) -> None:
+        """Record a pause of the process, which ends now."""
+        self.late += seconds
+        self._pauses.append((now, seconds))
+        if seconds > self._senders_patience:
+            self.treat_as_old()
 
     def _expire(self, now: float) -> bool:
         """Do the work that needs no line; return True if there was some."""

@@ -393,8 +393,8 @@ def test_heartbeats_fallbacks_and_questions_for_run_are_counted_in_the_load() ->
     model = line_model(QUICK)
     assert own_work(model, Rows([plain]), 0.1) == []
     written, asked = own_work(model, Rows([beat(100)]), 0.1)
-    assert written == (pytest.approx(write_time(QUICK, beat())), 0.1, 1)
-    assert asked.period == MODE_PERIOD
+    assert (*written, asked.period) == (
+        pytest.approx(write_time(QUICK, beat())), 0.1, 1, MODE_PERIOD)
     assert [own.period for after in (3000, 9000) for own in own_work(
         model, Rows([speed(after), speed(after, station=2), speed(after, 'Serve')]), 0.1)] == [
         5.0, 5.0, 2.0, 2.0, 9.0, 9.0, 2.0, 2.0]

@@ -55,6 +55,7 @@ import tty
 sys.path[:0] = [str(Path(__file__).resolve().parents[3])]
 
 from abdf1_ros.df1 import frames  # noqa: E402
+from abdf1_ros.df1.machine import Machine  # noqa: E402
 from abdf1_ros.df1.packet import Packet  # noqa: E402
 from abdf1_ros.driver.driver import Driver  # noqa: E402
 from abdf1_ros.driver.settings import DriverSettings  # noqa: E402
@@ -180,19 +181,23 @@ def _take_turns(line: BareLine, talk: Iterator[list[tuple[bytes, int]]],
 def measure_without_waiting(loops: int = 7, count: int = 2000) -> tuple[float, float, float]:
     """Return s of processor time, calls of Python functions and of C functions of each."""
     replies = [reply for _, reply in map(_frames, range(1, count + 2))]
-    best = min(_time_in_memory(replies) for _ in range(loops))
+    best = min(_time_in_memory(_machine(), replies) for _ in range(loops))
     calls: Counter[str] = Counter()
+    machine = _machine()
     sys.setprofile(lambda frame, event, argument: calls.update((event,)))
     try:
-        _time_in_memory(replies)
+        _time_in_memory(machine, replies)
     finally:
         sys.setprofile(None)
     return best, calls['call'] / count, calls['c_call'] / count
 
 
-def _time_in_memory(replies: list[bytes]) -> float:
+def _machine() -> Machine:
+    return Driver(NETWORK, [MAPPING], DriverSettings(), Listener()).machine
+
+
+def _time_in_memory(machine: Machine, replies: list[bytes]) -> float:
     """Return s of processor time of a transaction."""
-    machine = Driver(NETWORK, [MAPPING], DriverSettings(), Listener()).machine
     outlet = Memory()
     used = time.process_time()
     machine.start(0.0, outlet)
