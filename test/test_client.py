@@ -313,8 +313,9 @@ def test_arguments_of_the_line_and_gateways_reach_it(
     more: dict[str, Any] = {'trace': '/x/line.cap', 'logger': logging.Logger('other')}
     Client('/dev/x', baud=19200, parity='even', check='bcc', station=254, own_station=254,
            retries=10, timeout=0.25, cmd_timeout=0.75, duplex='HALF', **more)
-    Client.from_files(*files(tmp_path, '/dev/x', 'Tag,Command,Address,Station,Via,PLC_Type\n'
-                                                 'far,Read,N7:0,9,3,SLC\n'), **more)
+    rows = 'Tag,Command,Address,Station,Via,PLC_Type\nfar,Read,N7:0,9,3,SLC\n' \
+        'last,Read,N7:0,254,,SLC\nall,Write,N7:0,255,,SLC\n'
+    assert [*Client.from_files(*files(tmp_path, '/dev/x', rows), **more).rows] == ['far', 'last']
     port = PortSettings('/dev/x', 19200, parity='Even')
     assert given[0] == (MASTER, LinkSettings(
         station=254, checksum=Checksum.BCC, timing=LineTiming(port.char_time), nak_retries=10,
