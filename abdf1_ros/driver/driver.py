@@ -113,12 +113,11 @@ class Driver:
         self.counters = Counters()
         self.machine = network.line_mode.make_machine(
             network.line, self._run, self.counters, self)
-        self._record = WriteRecord(self.machine, 2 * network.cmd_timeout / 1000)
         self.stations = ActiveStationList(
             self.mappings.stations, self._station_changed,
             _routes(network, mappings), network.line_mode.longest_probe(network.line),
             self.machine.took, QUESTION_PERIOD if settings.may_store else 0.0,
-            self._record.gateway_replied)
+            self._gateway_replied)
         # Only a gateway answers for several stations in full duplex.
         are_behind = network.line_mode.has_one_plc and len(self.mappings.stations) > 1
         for row in self.mappings.of_plcs:
@@ -138,7 +137,9 @@ class Driver:
     def _make_queues(self) -> None:
         """Make the queues of jobs, and the agenda that decides between them."""
         network, settings, machine = self.network, self._settings, self.machine
-        record, report = self._record, self._listener.written
+        report = self._listener.written
+        self._record = record = WriteRecord(
+            machine, 2 * network.cmd_timeout / 1000, self.stations)
         self.readings = Readings(
             network, self._active_rows(), settings, self.stations, machine, self._listener, record)
         self.points = self.readings.points
@@ -280,6 +281,9 @@ class Driver:
                    self.interlocks.ours.due, self._read_backs.next_expiry,
                    self._demands.next_expiry)
 
+    def _gateway_replied(self, number: int) -> None:
+        self._record.gateway_replied(number)
+
     def _station_changed(self, station: Station) -> None:
         self._standing.forget(station.number)
         if station.active:
@@ -373,7 +377,7 @@ class Driver:
     def _run(self) -> Procedure:
         """Open the queues; return the procedure of the link, which ends with the port."""
         self._connect()
-        if self._settings.may_store:  # also what comes from the line
+        if self._settings.may_store:  # it may also have kept commands of PLCs
             self.machine.treat_as_old()
         if self.overheard is not None:
             self.overheard.begin(self.machine.now)

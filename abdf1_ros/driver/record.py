@@ -229,13 +229,14 @@ class WriteRecord:
     All writes of a line.
 
     A write without an answer may land for ``settle_time`` s more, as a gateway may hold it.
+    ``stations`` knows which stations are behind a gateway.
     ``readers`` get the words of good reads.
     """
 
-    def __init__(self, line: LineTime, settle_time: float) -> None:
+    def __init__(self, line: LineTime, settle_time: float, stations: ActiveStationList) -> None:
         self.line = line
         self._settle_time = settle_time
-        self._stations = ActiveStationList()
+        self._stations = stations
         self._opened_until = -math.inf
         self._under_way: list[Claim] = []
         self._late: list[Claim] = []  # have ended, and may land; for equal words the last one
@@ -252,11 +253,10 @@ class WriteRecord:
         """Return the words of a row that the bridge writes by itself; watch them from now on."""
         return self._words.setdefault(row, OwnWords(row, self))
 
-    def opened(self, stations: ActiveStationList) -> None:
+    def opened(self) -> None:
         """Record that gateways may hold earlier writes: the port has been opened."""
-        behind = {station.number for station in stations if station.has_gateway}
+        behind = {station.number for station in self._stations if station.has_gateway}
         until = self._opened_until = self.line.now + self._settle_time
-        self._stations = stations
         for words in self._words.values():  # a gateway may show itself later
             words.may_land((_Writer.ANYBODY,), until)
         for listener in self._listeners:

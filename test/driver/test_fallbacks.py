@@ -63,7 +63,7 @@ class OneRow(StillClock):
     def __init__(self, cmd_timeout: float = 0.5) -> None:
         super().__init__()
         self.mapping = speed_row()
-        self.record = WriteRecord(self, 2 * cmd_timeout)
+        self.record = WriteRecord(self, 2 * cmd_timeout, ActiveStationList())
         self.row = FallbackRow(self.record.words_of(self.mapping))
 
     def message(self, begun: float, done: float, outcome: Outcome) -> None:
@@ -107,7 +107,8 @@ def test_rule_10_write_that_may_land_after_the_begin_of_a_fallback_has_it_writte
 def test_rule_10_write_may_land_after_reloads_of_files_that_had_no_fallback_for_its_words(
         is_guests: bool, now: float, until: float) -> None:
     row, clock = speed_row(None), StillClock()
-    before, between, after = (WriteRecord(clock, 1.0) for _ in range(3))
+    before, between, after = (
+        WriteRecord(clock, 1.0, ActiveStationList()) for _ in range(3))
     claim = before.begin(1, [row.extent], None if is_guests else Write(row, [3], 0.0))
     clock.now = 1.0
     before.ended(claim, Outcome.UNKNOWN, may_land=True)
@@ -124,8 +125,9 @@ def test_rule_10_write_may_land_after_reloads_of_files_that_had_no_fallback_for_
 @pytest.mark.parametrize(('processor', 'again'), [('ML1000', 1.0), ('5/03', math.inf)])
 def test_rule_10_word_that_may_be_written_back_late_has_old_values_of_other_bits(
         processor: str, again: float) -> None:
-    record, (row, other) = WriteRecord(StillClock(), 1.0), [make_mapping(
-        f'B3:0/{bit}', 'Write', plc='SLC', processor=processor) for bit in range(2)]
+    record = WriteRecord(StillClock(), 1.0, ActiveStationList())
+    row, other = (make_mapping(f'B3:0/{bit}', 'Write', plc='SLC', processor=processor)
+                  for bit in range(2))
     words, claim = record.words_of(row), record.begin(1, [other.extent], Write(other, [1], 0.0))
     record.ended(claim, Outcome.UNKNOWN, may_land=True)
     words.plan_again(0.5)

@@ -60,7 +60,7 @@ def make_job(text: str = 'N7:0', station: int = 1, period: int = 100) -> ReadJob
 
 def written(write: Write, now: float, outcome: Outcome = Outcome.WRITTEN) -> Claim:
     """Return a write that has ended, by default a confirmed one."""
-    record = WriteRecord(StillClock(now), 1.0)
+    record = WriteRecord(StillClock(now), 1.0, ActiveStationList())
     claim = record.begin(write.mapping.station, [write.mapping.extent], write)
     record.ended(claim, outcome)
     return claim
@@ -75,7 +75,7 @@ class Bench:
         self.stations = ActiveStationList([job.station for job in jobs], probe_time=PROBE_TIME)
         self.tasks = JobTasks(5, 0, line := StillClock())
         listener = Recorder(lambda: 0.0)
-        self.record = WriteRecord(line, 1.0)
+        self.record = WriteRecord(line, 1.0, self.stations)
         readings = Readings(Network(), Rows(), DriverSettings(), self.stations, line, listener,
                             self.record)
         writing = WritesUnderWay(self.stations, self.record, readings, write_timeout,

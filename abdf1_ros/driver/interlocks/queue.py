@@ -152,7 +152,7 @@ class Interlocks(WriteListener):
 
     def begin(self, now: float) -> None:
         """Begin a first contact with each station: the port has been opened (rule 2)."""
-        self._writing.record.opened(self._writing.stations)
+        self._writing.record.opened()
         if not self._has_begun:
             for row in self.fallbacks:
                 row.make_due(FallbackCause.START, now)
