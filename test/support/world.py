@@ -328,6 +328,9 @@ def ticks(now: float) -> int:
 # A lead that a stamp has shown is remembered for so long (s) at least (rule 7).
 LEAD_IS_KNOWN = 5.0
 
+# A longer standstill of the process is seen. For so long (s) after it, messages count as old (7).
+STILL_IS_SEEN, STILL_COUNTS = 0.25, 0.5
+
 
 def _written(value: int, is_right: bool) -> tuple[int, bytes]:
     """Return how the master writes to our table; a wrong command names a third word last."""
@@ -361,6 +364,7 @@ class Clocks:
     def forget(self) -> None:
         """Begin like a process that has just started."""
         self._shown: dict[str, float] = {}  # when a stamp of a topic was too far ahead
+        self._still: list[tuple[float, float]] = []  # ends of standstills, and their seconds
         self.host_clock = HostClock(self._patience)
         self._ages = {tag: Ages(self._patience, self.host_clock, allowed)
                       for tag, allowed in self.allowed.items()}
@@ -368,6 +372,10 @@ class Clocks:
     def set(self, seconds: float, now: float) -> None:  # noqa: A003
         """Set the clock of the host, by which its publishers go."""
         self._set_by, self._set_at = seconds, now
+
+    def stand_still(self, seconds: float, until: float) -> None:
+        """Record that the process stands still until then."""
+        self._still.append((until, seconds))
 
     def look(self, now: float) -> None:
         """Look at the clock of the host, as the main thread does."""
@@ -391,13 +399,16 @@ class Clocks:
         Tell whether a clock was ahead, and nothing that came lately can have shown that.
 
         A message that was late on its way for longer than its clock is ahead looks like a new one.
-        What the process knows is that its age is at least the time for which it stood still.
+        What the process knows is that its age is at least the time for which it stood still. This
+        is judged by the true time, not by what the process has seen of it.
         """
         allowed = self.allowed[tag]
         lead = stamp - published - (self._set_by if published >= self._set_at else 0.0)
         return allowed is not None and lead > allowed \
             and now - self._shown.get(tag, -math.inf) > LEAD_IS_KNOWN \
-            and age >= self.host_clock.least_age(now)
+            and age >= max((seconds for until, seconds in self._still
+                            if seconds > STILL_IS_SEEN and until <= now < until + STILL_COUNTS),
+                           default=0.0)
 
 
 class World(DriverBench):
@@ -785,6 +796,7 @@ class World(DriverBench):
         """Let the process of the driver stand still."""
         self.line.pause(self.driver.machine, seconds)
         self.away = self.line.now + seconds
+        self.clocks.stand_still(seconds, self.away)
 
     def behave_oddly(self, device: Device) -> None:
         """Let all PLCs behave like an odd but legal device."""
