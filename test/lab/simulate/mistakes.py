@@ -252,9 +252,10 @@ def _awaits_those_that_answer(before: Any) -> Any:
 
 
 def _stores_nothing(init: Any) -> Any:
-    def init_wrongly(self: Interlocks, mappings: Any, writes: Any, writing: Any, store: Any,
+    def init_wrongly(self: Interlocks, mappings: Any, writes: Any, writing: Any, served: Any,
                      *arguments: Any) -> None:
-        init(self, mappings, writes, writing, lambda write: None, *arguments)
+        init(self, mappings, writes, writing, mock.Mock(wraps=served, store=mock.Mock()),
+             *arguments)
 
     return init_wrongly
 

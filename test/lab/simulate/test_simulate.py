@@ -14,13 +14,15 @@
 
 """A few new plants in each run, and that a seed replays one."""
 
+from contextlib import suppress
 from dataclasses import replace
 import secrets
+from unittest import mock
 
 from abdf1_ros.df1.frames import ACK, ENQ
 from abdf1_ros.driver.write import Outcome
 import pytest
-from simulate.mistakes import MISTAKES
+from simulate.mistakes import Mistake, MISTAKES
 from simulate.rules import (
     Answers,
     Broken,
@@ -242,5 +244,9 @@ def test_value_that_no_read_has_shown_does_not_stand() -> None:
     assert 'another value' in steady.why_unproven('word', b'[9]', now)
 
 
-def test_mistakes_are_made_where_something_is() -> None:
-    assert [mistake.text for mistake in MISTAKES if not hasattr(mistake.owner, mistake.name)] == []
+@pytest.mark.parametrize('mistake', MISTAKES)
+def test_plant_with_a_mistake_begins(mistake: Mistake) -> None:
+    with mock.patch.object(mistake.owner, mistake.name,
+                           mistake.make(getattr(mistake.owner, mistake.name))), suppress(Broken):
+        for mode in 'Message', 'Slave':  # a Slave serves rows with Fallback
+            Story(1, mode).wait(0.5)
