@@ -266,13 +266,19 @@ class DriverBench:
             self.run(run)
 
     def run(self, seconds: float) -> None:
-        """Let time pass."""
-        end = self.line.now + seconds
-        while self._actions and self._actions[0][0] <= end:
-            when, _, action = heapq.heappop(self._actions)
-            self.line.run_for(max(0.0, when - self.line.now))
-            action()
-        self.line.run_for(end - self.line.now)
+        """Let time pass; what is planned meanwhile happens in its time, too."""
+        line, actions = self.line, self._actions
+        end = line.now + seconds
+        line.look()
+        while True:
+            due = min(end, actions[0][0] if actions else end)
+            if line.advance(due):
+                continue
+            line.now = max(line.now, due)
+            if not actions or actions[0][0] > end:
+                return
+            heapq.heappop(actions)[2]()
+            line.look()
 
     def run_until(self, condition: Callable[[], bool], limit: float = 60.0) -> None:
         """Let time pass until something is so; it has to be before the limit."""

@@ -166,20 +166,20 @@ class VirtualLine:
     def run(self, until: Callable[[], bool], limit: float) -> None:
         """Let time pass until ``until()``; fail after ``limit`` seconds, or when all is still."""
         end = self.now + limit
-        self._look_at_all()
+        self.look()
         while not until():
-            if not self._advance():
+            if not self.advance():
                 raise AssertionError(f'nothing will ever happen again, at {self.now}')
             assert self.now <= end, f'not done after {limit} s of line time'
 
     def run_for(self, seconds: float) -> None:
         end = self.now + seconds
-        self._look_at_all()
-        while self._advance(end):
+        self.look()
+        while self.advance(end):
             pass
         self.now = end
 
-    def _look_at_all(self) -> None:
+    def look(self) -> None:
         """Take in what a test has changed since time last passed."""
         for number in range(len(self._machines)):
             self._look_at(number)
@@ -188,7 +188,7 @@ class VirtualLine:
         moment = self._machines[number].next_call
         self._calls[number] = math.inf if moment is None else max(moment, self._away[number])
 
-    def _advance(self, end: float = math.inf) -> bool:
+    def advance(self, end: float = math.inf) -> bool:
         """Carry out the next event; return False when there is none up to ``end``."""
         arrivals, calls = self._arrivals, self._calls
         deadline = min(calls)
