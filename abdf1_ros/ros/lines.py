@@ -42,6 +42,7 @@ from abdf1_ros.ros.diagnostics.status import ERROR, message_of, OK, WARN, WORDS
 from abdf1_ros.ros.parameters.arguments import Arguments
 from abdf1_ros.ros.parameters.declared import take_given, wrong_names
 from abdf1_ros.ros.parameters.files import node_sections, parameter_files, parameter_tree
+from abdf1_ros.ros.parameters.values import usable
 from abdf1_ros.ros.process.main import EXIT_CONFIGURATION, make_parser, Program, REFUSALS, run_ros
 from abdf1_ros.ros.process.runner import Line, LinkFailed, Runner
 from abdf1_ros.settings.heartbeats import LONGEST_END
@@ -198,12 +199,13 @@ def _options(node: Node, arguments: Arguments) -> tuple[list[str], bool]:
     anything = ParameterDescriptor(dynamic_typing=True)
     wanted, is_strict = (node.declare_parameter(name, default, anything).value
                          for name, default in OPTIONS.items())
-    if isinstance(wanted, str) or not all(isinstance(name, str) for name in wanted):
+    if not isinstance(wanted, list) or not all(isinstance(name, str) for name in wanted):
         problems.append(Problem('parameter lines', (
             f"{wanted!r} should be a list of names, as in -p 'lines:=[/press/abdf1]'")))
-    if not isinstance(is_strict, bool):
-        problems.append(Problem(
-            'parameter strict_lines', f'{is_strict!r} should be true or false'))
+    try:
+        usable('strict_lines', is_strict, default=False)
+    except ValueError as error:
+        problems.append(Problem('parameter strict_lines', str(error)))
     if problems:
         raise ConfigurationError(problems)
     return list(wanted), is_strict

@@ -507,7 +507,11 @@ def test_one_name_for_all_lines_is_refused(capfd: Output) -> None:
 @pytest.mark.parametrize(('option', 'text'), [
     ('lines:=a', "parameter lines: 'a' should be a list of names, as in -p 'lines:=[/press/abdf1"),
     ('lines:=[1]', 'should be a list of names'),
-    ('strict_lines:=3', 'parameter strict_lines: 3 should be true or false'),
+    ('lines:=123', 'parameter lines: 123 should be a list of names'),
+    ('lines:=no', 'parameter lines: False should be a list of names'),
+    ('strict_lines:=3', 'parameter strict_lines: strict_lines = 3 should be true or false'),
+    ('strict_lines:="true"', "parameter strict_lines: strict_lines = 'true' is a text and should "
+                             'be true or false: write it without quotes, in Python True'),
     ('strict_line:=true', 'there is no such parameter; did you mean strict_lines?'),
     ('line:=[a]', 'there is no such parameter; did you mean lines?')])
 def test_options_that_cannot_be_meant(

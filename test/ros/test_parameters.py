@@ -38,6 +38,7 @@ from support.ros import ros_args, write_csv
 
 MAP = ['recipe,ReadWrite,N7:10,2,SLC,4,0,999', 'line/door,Read,I:017/12,1,PLC5,,,']
 MAP_HEADER = 'Tag,Command,Address,Station,PLC_Type,Length,Min,Max'
+YAML_MAKES = 'YAML makes'
 
 
 @pytest.fixture(scope='module')
@@ -203,7 +204,7 @@ def test_port_is_the_parameter_or_else_com_port(
     ('stale_after', 5, 5.0), ('diagnostics_period', 60, 60.0), ('diagnostics_period', 0.1, 0.1),
     ('default_period', 0, 0), ('default_period', 86_400_000, 86_400_000),
     ('read_only', True, True), ('write_timeout', 0.05, 0.05), ('poll_list', [1, 2], '1,2'),
-    ('poll_list', 3, '3'), ('priority_poll_list', [1, 2], '1,2'), ('trace_file', 1.5, '1.5')])
+    ('poll_list', 3, '3'), ('priority_poll_list', [1, 2], '1,2'), ('trace_file', './no', './no')])
 def test_own_parameter_has_the_value_and_type_that_was_given(
         configured: Configured, name: str, value: Any, expected: Any) -> None:
     found = getattr(configured(**{name: value}).parameters, name)
@@ -265,8 +266,25 @@ def test_gateway_is_polled_for_the_stations_behind_it(
     ('stale_after', math.nan, 'stale_after = nan should be a number from 1 to 1000'),
     ('stale_after', 'long', "stale_after = 'long' should be a number from 1 to 1000"),
     ('read_only', 1, 'read_only = 1 should be true or false'),
-    ('strict_map', 'on', "strict_map = 'on' should be true or false"),
+    ('strict_map', 'maybe', "strict_map = 'maybe' should be true or false"),
+    ('strict_map', 'on', "strict_map = 'on' is a text and should be true or false: write it "
+                         'without quotes, in Python True'),
+    ('read_only', 'true', "read_only = 'true' is a text and should be true or false: write it "
+                          'without quotes, in Python True'),
+    ('stale_after', '5', "stale_after = '5' is a text and should be a number from 1 to 1000: "
+                         'write it without quotes'),
+    ('poll_group_size', '9', "poll_group_size = '9' is a text and should be a whole number from "
+                             '0 to 255: write it without quotes'),
+    ('default_period', '1.5', "default_period = '1.5' should be a whole number from 0 to "
+                              '86400000'),
     ('map_file', [1, 2], 'map_file = [1, 2] should be text'),
+    *((name, value, f'{name} = {value} should be text: {YAML_MAKES} {made}; leave {name} out, or '
+       'write ./ before the name of a file')
+      for name in ('net_file', 'map_file', 'trace_file')
+      for value, made in ((False, 'true or false of words such as on and no'),
+                          (123, 'a number of it'), (1.5, 'a number of it'))),
+    *((name, False, f'{name} = False should be text: {YAML_MAKES} true or false of words such as '
+                    'on and no') for name in ('port', 'poll_list', 'priority_poll_list')),
     ('poll_list', '1,300', '"300" should be a station from 0 to 254, or a range such as 3-5; '
                            'put commas between them'),
     ('port', 'ttyUSB0', 'Com_Port = "ttyUSB0" should be a number from 1, a device path such as '

@@ -36,6 +36,7 @@ from abdf1_ros.ros.parameters.arguments import Arguments, is_for
 from abdf1_ros.ros.parameters.file_watch import FileWatch
 from abdf1_ros.ros.parameters.files import parameters_in, typed_numbers
 from abdf1_ros.ros.parameters.shown import descriptor_of, map_cells, MOST_SHOWN_ROWS, text_of
+from abdf1_ros.ros.parameters.values import usable
 from abdf1_ros.settings.columns import COLUMNS, MAX_PERIOD
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Mapping
@@ -126,14 +127,10 @@ NODE_NAME = 'abdf1'
 
 _OF_RCLPY = 'use_sim_time', 'start_type_description_service'
 
-_KINDS = {bool: 'true or false', int: 'a whole number', float: 'a number', str: 'text'}
-
-
 _MAP_NAMES = {column.lower() for column in COLUMNS}
 
 _OF_STANDARD_POLLING = ('poll_list', 'priority_poll_list', 'poll_group_size', 'poll_multiple',
                         'send_in_sequence')
-_STATION_LISTS = 'poll_list', 'priority_poll_list'
 
 # Shown as absolute paths, because a relative path does not say which file it is.
 _PATHS = ('net_file', 'map_file')
@@ -420,19 +417,9 @@ def _declare_own(node: Node, given: Given, problems: list[Problem]) -> Parameter
         default = getattr(usual, entry.name)
         value = _declare(node, given, entry.name, default, descriptor_of(
             default, entry.metadata['description'], low, high, read_only=True))
-        kind = type(default)
-        if kind is float and type(value) is int:
-            value = float(value)
-        if kind is str and isinstance(value, int | float):
-            value = str(value)
-        if entry.name in _STATION_LISTS and isinstance(value, list):  # a YAML list: [1, 2]
-            value = ','.join(map(str, value))
-        if type(value) is not kind or (low is not None and not low <= value <= high):
-            right = _KINDS[kind]
-            if low is not None:
-                right += f' from {low:.15g} to {high:.15g}'
-            problems.append(Problem(
-                f'parameter {entry.name}', f'{entry.name} = {value!r} should be {right}'))
-            value = default
-        values[entry.name] = value
+        try:
+            values[entry.name] = usable(entry.name, value, default, low, high)
+        except ValueError as error:
+            problems.append(Problem(f'parameter {entry.name}', str(error)))
+            values[entry.name] = default
     return Parameters(**values)
