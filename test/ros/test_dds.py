@@ -252,6 +252,13 @@ def test_other_node_of_our_name_is_told_at_once_and_again_when_it_is_no_earlier_
         (0, MAYBE), (30, 'another node is called /press too'), (40, GONE)]
 
 
+def test_other_node_of_our_name_may_be_a_spare_that_a_new_name_would_end() -> None:
+    (news,) = NameWatch('/press', lambda now: 2, renaming='-r __node:=line_2').look(0.0)
+    assert news.text.partition(': ')[2] == (
+        'both use the same topics. If one is a spare of the other, set standby on both; if not, '
+        'rename one, as in -r __node:=line_2')
+
+
 def test_earlier_run_that_was_killed_is_forgotten() -> None:
     assert changes_of(*[2] * 25, 1, *[2] * 25, 0) == [(0, MAYBE), (25, GONE), (26, MAYBE),
                                                       (51, GONE)]

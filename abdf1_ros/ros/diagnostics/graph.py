@@ -120,8 +120,9 @@ class NameWatch:
             stays = now - self._since >= _KILLED_IS_SEEN
             text = f'another node is called {self._name} too' + (
                 '' if stays else ', or an earlier run of it was killed less than 20 s ago')
-            news = News(WARN, 'the name', f'{text}: both use the same topics; rename one of '
-                        f'them, as in {self._renaming}')
+            news = News(WARN, 'the name', f'{text}: both use the same topics. If one is a spare '
+                        f'of the other, set standby on both; if not, rename one, as in '
+                        f'{self._renaming}')
         else:
             self._since, text = None, ''
             news = News(INFO, 'the name', f'no other node is called {self._name} any more')
