@@ -18,8 +18,8 @@ Commands of guests: programs that share the PLC's port with us, each at a place 
 A guest's command waits here for its turn on the line and gets exactly one reply, in time. This is
 the reply of the PLC, or our reply with an STS of M 8-2.
 
-- Not sent: 60 (not allowed), 01 (no buffer, or too old to be sent), 04 (the port is not open), 07
-  (the station is silent).
+- Not sent: 60 (not allowed), 01 (no buffer, too old to be sent, or a pause of ``unanswered``), 04
+  (the port is not open), 07 (the station is silent).
 - Sent, without a reply: 02 (the station has become silent), 05 (no reply in time). Whether it was
   executed is then unknown.
 """
@@ -38,6 +38,7 @@ from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.inbox import Inbox
 from abdf1_ros.driver.job_tasks import Job, LineTime
 from abdf1_ros.driver.record import Claim, WriteRecord
+from abdf1_ros.driver.unanswered import UnansweredCommands
 from abdf1_ros.driver.write import Outcome
 from abdf1_ros.errors import CommandExpired, PortLost, StationInactive
 from abdf1_ros.pccc.describe import effect_of
@@ -168,6 +169,7 @@ class GuestQueue:
         self._words = words
         self._record = record
         self._fell_silent = fell_silent
+        self._unanswered = UnansweredCommands()
         self.inbox: Inbox[GuestCommand] = Inbox(is_open=False)  # commands not sorted yet
         self.waiting: deque[Guest] = deque()  # guests with commands, the next one first
         self.next_expiry = math.inf  # when ``expire`` has work (clock value in s)
@@ -208,13 +210,18 @@ class GuestQueue:
                 self.waiting.append(guest)
             self._look()
             station = self._station_of(command.packet.dst)
+            if not self._unanswered.may_be_sent(station, command.packet, now):
+                self._give_up(command, _NO_BUFFER)
+                continue
             if self._stations[station].last_heard is None:
                 self._silent(station, now)  # maybe no such station: one poll or try at a time
             # A broadcast has no reply.
             is_read = effect_of(command.packet) is Effect.READS
             is_vain = station == BROADCAST if is_read else not may_write
             if not is_vain and self._stations.claim_message(station, now):
-                return GuestJob(self, command, station, self._claim(command.packet, station))
+                job = GuestJob(self, command, station, self._claim(command.packet, station))
+                job.is_probe = not self._stations[station].replies_in_time
+                return job
             self._give_up(command, _OFF_LINE)
         return None
 
@@ -261,6 +268,7 @@ class GuestQueue:
         command, station = job.asked, job.station
         job.has_failed = error is not None
         was_sent = error is None or getattr(error, 'sent', True)
+        self._note_answer(job, begun, error, was_sent)
         if error is not None:
             if was_sent or not isinstance(error, CommandExpired):  # else it was not even asked
                 self._silent(station, self.line.now)
@@ -273,6 +281,15 @@ class GuestQueue:
                     command.guest, command.packet, station, list(claim.extents or ()))
         self._stations.tried(
             station, begun, self.line.now, asker=Asker.MESSAGE, was_silent=True)
+
+    def _note_answer(self, job: GuestJob, begun: float, error: Exception | None,
+                     was_sent: bool) -> None:
+        """Record whether a command was answered: a silent station says nothing about it."""
+        is_answered = error is None and not is_local_status(job.sts)
+        if is_answered or was_sent and not job.is_probe and not isinstance(error, PortLost):
+            now = self.line.now
+            self._unanswered.tried(job.station, job.asked.packet, self.line.took(begun, now), now,
+                                   is_answered=is_answered)
 
     def _silent(self, station: int, now: float) -> None:
         """Treat a station that only guests ask as silent: no other command shows its silence."""

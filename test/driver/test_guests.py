@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.driver.foreign_words import written_extents
@@ -34,6 +35,7 @@ import pytest
 from support.cases import for_all
 from support.driver_bench import DriverBench, Program, READ_N7, store, stored
 from support.mappings import make_mapping
+from support.odd_device import Answer, OddDevice, Wiring
 
 WRITE_N7 = bytes.fromhex('AA 02 07 89 00 00 34 12')
 
@@ -423,6 +425,42 @@ def test_failure_of_a_guest_says_nothing_about_the_station(
     assert beats == {BeatState.COUNTS}
     assert not bench.listener.numbers() & {Message.ERR_INACTIVE_STATION.number}
     assert len(bench.listener.reads) - reads > 16
+
+
+@pytest.mark.parametrize('mode', ['Master', 'Peer'])
+def test_command_that_is_never_answered_gets_less_and_less_of_the_line(mode: str) -> None:
+    """The PLC acknowledges it each time; all other commands are answered, also of this guest."""
+    device = OddDevice(Wiring.HALF if mode == 'Master' else Wiring.FULL)
+    bad, good = bytes.fromhex('A2 02 63 89 00 00'), READ_N7
+    device.takes = lambda data: Answer.LOSES if data[6:] == bad else Answer.ACK
+    bench = DriverBench(
+        [make_mapping('N7:0', station=1, plc='SLC', period=100)], far=device,
+        network=Network(mode=mode, baud=19200, timeout=200, cmd_timeout=1000))
+    bench.run(2.0)
+    before = len(bench.listener.reads)
+    program, other = Program(bench), Program(bench)
+    other.guest = program.guest
+    tries = list[float]()
+
+    def hear(data: bytes) -> bytes:
+        if bad in data:
+            tries.append(bench.clock())
+        return data
+
+    device.hear = hear
+    program.go_on(lambda: program.ask(bad), pause=0.1)
+    other.go_on(lambda: other.ask(good), pause=0.1)
+    run(bench, 120.0)
+    gaps = [later - sooner for sooner, later in pairwise(tries)]
+    assert gaps == sorted(gaps) and 30.0 < gaps[-1] < 65.0
+    assert len(tries) < 7
+    assert program.statuses.count(0x05) == len(tries)
+    assert set(program.statuses) == {0x05, 0x01} and set(other.statuses) == {0x00, 0x01}
+    assert other.statuses.count(0x01) < 0.05 * len(other.statuses)  # just after each try
+    device.takes = lambda data: Answer.ACK
+    run(bench, 62.0)
+    assert program.statuses[-10:] == 10 * [0x00]
+    assert len(bench.listener.reads) - before > 0.9 * 1820
 
 
 def test_lost_port_is_told_and_what_waits_is_not_sent_later() -> None:
