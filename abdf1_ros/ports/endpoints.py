@@ -41,7 +41,7 @@ _GLANCE = 0.2  # s; longest wait for a client in ``open``
 
 _PAUSE = 50  # ms between two reads of a wire that no program has opened
 
-# A client that has sent nothing for this time (s) loses its place to the next client.
+# A client that gives no sign of life for this time (s) loses its place to the next client.
 _SILENT = 30.0
 
 # TCP probes a silent client after 4 s, then every 2 s. After three probes without an answer the
@@ -309,19 +309,23 @@ class TcpEndpoint:
     A listening TCP port, which one client at a time uses as a line; with 0, any free port.
 
     The connection of a second client is closed at once, and ``tell`` is called with its address.
-    But a second client takes the place of a client that has closed, or has sent nothing for 30 s.
-    The loss of a client is noticed within 10 s. ``open`` waits ``glance`` seconds for a client.
+    But a second client takes the place of a client that has closed, or has given no sign of life
+    for 30 s. A sign of life is a change of ``count_frames()``, the number of good frames so far;
+    without it, any byte. The loss of a client is noticed within 10 s. ``open`` waits ``glance``
+    seconds for a client.
     """
 
     def __init__(self, host: str, port: int, tell: Callable[[str], None] = lambda other: None,
-                 glance: float = _GLANCE) -> None:
+                 glance: float = _GLANCE, count_frames: Callable[[], int] | None = None) -> None:
         family = socket.AF_INET6 if ':' in host else socket.AF_INET
         self._listener = socket.create_server((host, port), family=family)
         self._listener.setblocking(False)
         self._tell = tell
         self._glance = glance
         self._next: socket.socket | None = None
-        self._heard = 0.0  # when the client sent its last bytes (s)
+        self._count_frames = count_frames
+        self._frames = 0
+        self._heard = 0.0  # when the client gave its last sign of life (s)
         host, port = self._listener.getsockname()[:2]
         self.name = f'socket://[{host}]:{port}' if ':' in host else f'socket://{host}:{port}'
 
@@ -343,6 +347,9 @@ class TcpEndpoint:
 
     def _look(self, client: socket.socket, has_said: bool) -> None:
         """Refuse another client, or raise OSError if it takes the place of this client."""
+        if self._count_frames is not None:
+            before, self._frames = self._frames, self._count_frames()
+            has_said = self._frames != before
         if has_said:
             self._heard = monotonic()
         try:
@@ -354,8 +361,8 @@ class TcpEndpoint:
             raise OSError('the program closed the connection, and another program has come')
         if monotonic() - self._heard > _SILENT:
             self._next = other
-            raise OSError(f'the program was silent for {_SILENT:.0f} s, and another program has '
-                          'come')
+            raise OSError(f'the program gave no sign of life for {_SILENT:.0f} s, and another '
+                          'program has come')
         other.close()
         self._tell(':'.join(map(str, address[:2])))
 

@@ -145,7 +145,8 @@ class GuestLine:
             return PtyPlace(place.name)
         if place.kind == 'tcp':
             return TcpEndpoint(place.host, place.port,
-                               partial(self.guest.listener.turned_away, self.guest), 0.0)
+                               partial(self.guest.listener.turned_away, self.guest), 0.0,
+                               lambda: self.machine.counters.messages_received)
         return SerialEndpoint(self._port)
 
     def _changed(self, state: PortState) -> None:

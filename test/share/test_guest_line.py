@@ -33,6 +33,7 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.guests import GuestCommand, GuestListener, GuestQueue
 from abdf1_ros.driver.settings import DriverSettings
+from abdf1_ros.ports import endpoints
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.descriptor import NoClient, READ_SIZE
 from abdf1_ros.ports.endpoints import PtyEndpoint
@@ -47,6 +48,7 @@ from support.cases import for_all
 from support.device_server import OWN_HOST
 from support.driver_bench import FarEnd, Recorder, simulated_plc, store, stored
 from support.mappings import make_mapping
+from support.odd_device import frame as odd_frame
 from support.ptys import Pty
 
 # The rules themselves are those of a peer, played in test/conform; here that a place is one.
@@ -304,6 +306,38 @@ def test_reply_to_a_program_that_has_left_does_not_go_to_the_next() -> None:
     assert line.machine.data_to_send() == frames.message_frame(
         asked[1].packet.reply().encode(), Checksum.CRC)
     line.stop()
+
+
+@pytest.mark.parametrize('is_frame', [False, True])
+def test_place_is_kept_by_good_frames_not_by_bytes(
+        is_frame: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A program sends something each 8 s, up to 32 s; then another program comes."""
+    command = odd_frame(bytes.fromhex('01 09 0F 00 01 00 A2 02 07 89 00 00'))
+    now, asked = 100.0, list[GuestCommand]()
+    monkeypatch.setattr(endpoints, 'monotonic', lambda: now)
+    line = guest_line(f'tcp:{OWN_HOST}:{(port := free_port())}', asked.append)
+
+    def say(client: socket.socket, data: bytes) -> None:
+        heard = line.machine.counters.chars_received + len(data)
+        client.sendall(data)
+        wait_for(lambda: line.machine.counters.chars_received == heard)
+
+    line.start()
+    wait_for(lambda: line.state == 'waiting for a client')
+    with socket.create_connection((OWN_HOST, port), 30.0) as first:
+        for said in (b'A', b'\x10\x05', command[:-1] + b'!', command if is_frame else b'A'):
+            say(first, said)
+            now += 8.0
+        with socket.create_connection((OWN_HOST, port), 30.0) as second:
+            if is_frame:
+                assert second.recv(1) == b''
+            else:
+                second.sendall(command)
+                assert second.recv(2) == b'\x10\x06'
+                while first.recv(100):
+                    pass
+    line.stop()
+    assert len(asked) == 1
 
 
 def test_internal_error_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
