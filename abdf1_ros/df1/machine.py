@@ -321,8 +321,7 @@ class Machine:
 
     def start(self, now: float, outlet: Outlet | None = None) -> None:
         """Start the procedure from its beginning; ``outlet`` is the port of the line."""
-        self.stop()
-        self.now = now
+        self.stop(None, now)
         self.sender.begin(now, outlet)
         self._procedure = self._make_procedure(self)
         self._resume(None)
@@ -331,13 +330,14 @@ class Machine:
         """Treat the messages of the next half second as messages that may have waited."""
         self._old_until = self.now + OLD
 
-    def stop(self, error: Exception | None = None) -> None:
+    def stop(self, error: Exception | None, now: float) -> None:
         """
         End the procedure; if there is an ``error``, raise it inside the procedure first.
 
         A procedure handles the error like the end of its transaction, so each of its commands gets
-        a result.
+        a result. ``now`` is when this happens, mostly long after the last call.
         """
+        self.now = now
         procedure, self._procedure = self._procedure, None
         self.sender.clear()
         self.decoder.reset()

@@ -306,7 +306,7 @@ class LinkThread(threading.Thread):
             return
         self._next = None
         if exchange.claim():
-            self._machine.stop(PortLost(exchange.reason))
+            self._machine.stop(PortLost(exchange.reason), self._clock())
             self._while_sending()
             exchange.take_over()
             self._machine, self._while_sending = exchange.machine, exchange.while_sending
@@ -334,7 +334,7 @@ class LinkThread(threading.Thread):
             end = INTERNAL_ERROR
             self._take_fault(error)
         finally:
-            self._machine.stop(PortLost(end))
+            self._machine.stop(PortLost(end), self._clock())
             port.close()
             self._while_sending()  # its work has waited for the next frame, which does not come
         return False

@@ -202,7 +202,7 @@ def test_reflex_waits_for_the_rest_of_a_divided_message() -> None:
     machine.handle_timeout(9.0)
     assert sent + machine.data_to_send() == MESSAGE + EOT
     machine.start(20.0)
-    machine.stop()  # nothing is left of the second message
+    machine.stop(None, 20.0)  # nothing is left of the second message
     sender = machine.sender
     assert (machine.next_call, sender.still_here, sender.send_before) == (None, 0, math.inf)
 
@@ -450,7 +450,7 @@ def test_wake_disturbs_no_transaction(step: Step) -> None:
 def test_stop_raises_its_error_inside_the_procedure() -> None:
     bench = Bench(Send(FRAME, 1.0))
     error = OSError('unplugged')
-    bench.machine.stop(error)
+    bench.machine.stop(error, 0.5)
     assert bench.error is error
     assert (bench.machine.data_to_send(), bench.machine.deadline) == (b'', None)
     bench.machine.receive_data(ACK, 1.0)
@@ -466,7 +466,8 @@ def test_start_begins_afresh() -> None:
     assert (bench.machine.data_to_send(), bench.machine.deadline) == (FRAME, 13.0)
 
 
-@pytest.mark.parametrize('prepare', [lambda machine: machine.handle_timeout(0.0), Machine.stop])
+@pytest.mark.parametrize('prepare', [
+    lambda machine: machine.handle_timeout(0.0), lambda machine: machine.stop(None, 0.5)])
 def test_characters_are_counted_in_both_directions(prepare: Callable[[Machine], None]) -> None:
     machine = Bench(Send(FRAME, None), Send(EOT, None), start=None).machine
     machine.start(0.0)

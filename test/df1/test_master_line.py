@@ -155,7 +155,7 @@ def test_start_forgets_what_waited_to_be_passed_on(standard: bool) -> None:
     rig.start()
     rig.ask(7)
     rig.line.run(lambda: rig[7].slave.counters.acks_received > (not standard), 1.0)
-    rig.master.machine.stop()
+    rig.master.machine.stop(None, rig.clock())
     rig.forget()
     rig.run(1.0)
     rig.master.machine.start(rig.clock())

@@ -146,7 +146,7 @@ def test_command_whose_ack_the_port_does_not_take_is_not_executed_later() -> Non
     Wire(peer.machine, fail).attach(peer.now)
     with pytest.raises(PortLost) as lost:
         peer.hear_packet(THEIRS)
-    peer.machine.stop(lost.value)
+    peer.machine.stop(lost.value, peer.now)
     peer.start()
     assert (peer.hear(ENQ), peer.served) == (NAK, [])
 

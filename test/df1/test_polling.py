@@ -188,7 +188,7 @@ def test_longest_scan_does_not_contain_the_time_without_a_port() -> None:
     rig = bench(PollingSettings((1,), priority=(2,)))
     lists = rig.master.link.status().scans.values()
     rig.start(run=1.0)
-    rig.master.machine.stop(PortLost('unplugged'))
+    rig.master.machine.stop(PortLost('unplugged'), rig.clock())
     rig.run(30.0)
     rig.master.machine.start(rig.clock())
     rig.line.wake(rig.master.machine)

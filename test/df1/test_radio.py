@@ -236,7 +236,7 @@ def test_what_has_not_left_when_the_port_is_lost_is_undelivered(unsent: int) -> 
     bench.begin(COMMAND)
     bench.wait(0.2)
     Wire(bench.machine, unsent=lambda: unsent).attach(bench.now)
-    bench.machine.stop(PortLost('the line takes nothing'))
+    bench.machine.stop(PortLost('the line takes nothing'), bench.now)
     assert bench.machine.counters.unsent_messages == (unsent > 0)
     bench.machine.start(bench.now)
     bench.begin(COMMAND)

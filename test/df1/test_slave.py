@@ -170,7 +170,7 @@ def test_command_whose_ack_the_port_does_not_take_is_not_executed_later() -> Non
     Wire(bench.machine, fail).attach(bench.now)
     with pytest.raises(PortLost) as lost:
         bench.hear(bench.frame(FROM_MASTER))
-    bench.machine.stop(lost.value)
+    bench.machine.stop(lost.value, bench.now)
     bench.machine.start(bench.now)
     assert (bench.poll(), bench.served) == (EOT, [])
 

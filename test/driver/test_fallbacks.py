@@ -39,7 +39,7 @@ from abdf1_ros.settings.network import Network
 import pytest
 from support.cases import for_all
 from support.clock import StillClock
-from support.driver_bench import DriverBench, store
+from support.driver_bench import DriverBench, store, stored
 from support.interlocks import (
     AFTER,
     beat_row,
@@ -120,6 +120,36 @@ def test_rule_10_write_may_land_after_reloads_of_files_that_had_no_fallback_for_
     after.take_over(between)
     assert words.lands_until == until
     assert told.may_land.call_count == (until > now)
+
+
+@pytest.mark.parametrize('is_lost', [True, False])  # else it gives way to a machine of new files
+def test_rule_10_write_that_ends_with_the_port_may_land_for_its_time_from_then_on(
+        is_lost: bool) -> None:
+    """A gateway says nothing and keeps a write, so nothing comes until the port is lost."""
+    speed = speed_row(Fallback((7,), 600))
+    bench = DriverBench([speed], network=Network(
+        mode='Peer', baud=115200, timeout=100, cmd_timeout=500), start=False)
+    plc = bench.plc(1, 'PLC5', ('N7:0', 20))
+    serve, kept = plc.serve, list[Packet]()
+
+    def keep(command: Packet) -> Packet | None:
+        if not command.data.endswith(b'\x2a\0'):
+            return serve(command)
+        kept.append(command)
+        return None
+
+    plc.serve = keep  # type: ignore[assignment]
+    bench.open(run=1.0)
+    bench.write(speed, [42], run=0.45)
+    if is_lost:
+        bench.lose_port()
+        bench.at(bench.clock() + 0.3, bench.open)
+    else:
+        bench.hand_over([speed])
+    bench.at(bench.clock() + 0.99, lambda: serve(kept[0]))
+    bench.run(1.2)
+    assert len(kept) == 1
+    assert stored(plc, 'N7:0') == b'\7\0'
 
 
 @pytest.mark.parametrize(('processor', 'again'), [('ML1000', 1.0), ('5/03', math.inf)])

@@ -134,7 +134,7 @@ def test_rule_26_port_that_may_store_gets_a_question_before_the_first_write_and_
     bench, sent = Bench(slave=refuses, may_store=may_store), list[int]()
     for station in (1, 1, 9, 1, 1):
         if len(sent) == 4:
-            bench.requests.machine.stop(PortLost('unplugged'))
+            bench.requests.machine.stop(PortLost('unplugged'), bench.line.now)
             bench.line.start()
         before = bench.requests.counters.commands_sent
         bench.add(station, (write for write in [WRITE]))
@@ -182,7 +182,7 @@ def test_lost_port_ends_all_requests() -> None:
     bench.add(1, identify())
     bench.line.wake(bench.requests.machine)
     bench.line.run_for(0.1)
-    bench.requests.machine.stop(PortLost('unplugged'))
+    bench.requests.machine.stop(PortLost('unplugged'), bench.line.now)
     first, second = bench.ends.errors
     assert str(first) == str(second) == 'port lost: unplugged'
     assert isinstance(first, LinkError) and first.sent
@@ -253,7 +253,7 @@ def test_request_that_waits_for_its_station_ends_with_the_port(error: Exception)
     for _ in range(2):
         requests.add(1, echo(b''), ends.results.append, ends.errors.append)
     requests.machine.wake(0.0)
-    requests.machine.stop(error)
+    requests.machine.stop(error, 0.5)
     requests.machine.start(1.0)
     assert [str(error) for error in ends.errors] == [f'port lost: {error.args[0]}'] * 2
     assert requests.machine.data_to_send() == b''

@@ -94,11 +94,13 @@ def test_wake_may_come_in_any_number_and_before_the_start(pty: Pty, link: Link) 
 def test_port_that_vanishes_is_opened_again_when_it_is_back(pty: Pty, link: Link) -> None:
     script, thread = link.begin(pty, Listen(None))
     assert link.state().is_open
+    vanished = line_time()
     pty.close()
     lost = link.state()
     assert not lost.is_open
     assert lost.text.startswith('the port was lost: ')
     assert script.end().startswith('PortLost(')
+    assert script.machine.now >= vanished  # what was under way ended then (rule 10)
     assert script.machine.counters.read_errors == 1
     state = link.state()
     assert state.text.startswith('cannot open the port: ')

@@ -171,7 +171,7 @@ class Player(CommandTasks):
             self.machine.wake(self._now)
         else:
             if self._is_new:
-                self.machine.stop()
+                self.machine.stop(None, self._now)
                 self._make_link()
             self.machine.start(self._now, self)
 

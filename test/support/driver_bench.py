@@ -48,6 +48,7 @@ from support.virtual_line import VirtualLine
 READ_N7 = bytes.fromhex('A2 02 07 89 00 00')
 
 _WHOLE_FRAMES = 1000
+READ_AGAIN = 'the files have been read again'
 
 Kept = str | list[float]
 
@@ -244,6 +245,17 @@ class DriverBench:
         self.driver = driver
         self.open()
 
+    def hand_over(self, mappings: Sequence[Mapping], first_tns: int = 0) -> None:
+        """Go on with a driver of new files, which knows what the last one knows, as the link does."""
+        before, self.mappings = self.driver, mappings
+        settings = replace(self._settings, first_tns=first_tns)
+        driver = Driver(self.network, mappings, settings, self.listener)
+        before.machine.stop(PortLost(READ_AGAIN), self.line.now)
+        driver.take_over(before)
+        self.line.exchange(before.machine, driver.machine)
+        self.driver = driver
+        self.open()
+
     def breathe(self) -> None:
         """Let the executor run ten times a second from now on, while it ``is_alive``."""
         if self.is_alive:
@@ -251,7 +263,7 @@ class DriverBench:
         self.at(self.line.now + 0.1, self.breathe)
 
     def lose_port(self, reason: str = 'unplugged') -> None:
-        self.driver.machine.stop(PortLost(reason))
+        self.driver.machine.stop(PortLost(reason), self.line.now)
 
     def at(self, when: float, action: Callable[[], object]) -> None:
         """Do something at a moment of the clock, while ``run`` lets time pass."""

@@ -890,7 +890,7 @@ class World(DriverBench):
         limit = self.line.now + LONGEST_END
         while not interlocks.is_over and self.line.now < limit:
             self.run(STEP / 10)
-        self.driver.machine.stop(PortLost('the end'))
+        self.driver.machine.stop(PortLost('the end'), self.line.now)
         self.run(self.held_for)
 
     def reload(self) -> None:

@@ -115,13 +115,13 @@ class _Line:
 
     def lose(self) -> None:
         """Lose the port, and open it again."""
-        self.driver.machine.stop(PortLost('unplugged'))
+        self.driver.machine.stop(PortLost('unplugged'), self.now)
         self.driver.machine.start(self.now)
         self._settle()
 
     def end(self) -> None:
         """Lose the port for ever; then each write has had one result, each guest one reply."""
-        self.driver.machine.stop(PortLost('unplugged'))
+        self.driver.machine.stop(PortLost('unplugged'), self.now)
         assert len(self.heard.results) == self.accepted
         assert len(self.answered) == len(self.asked)
         for command in self.asked:

@@ -222,7 +222,7 @@ class FaultyLine:
             plc.faults.status = ()
 
     def _unplug(self) -> None:
-        self.driver.machine.stop(PortLost('unplugged'))
+        self.driver.machine.stop(PortLost('unplugged'), self.clock())
         self._write_all()
         self.run(self._random.uniform(0.1, 5.0))
         self.driver.machine.start(self.clock())
