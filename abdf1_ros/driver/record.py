@@ -52,7 +52,6 @@ class _Writer(Enum):
     NEIGHBOUR = auto()  # a row with other bits of a word that is written back as a whole
     GUEST = auto()
     GUEST_SOMEWHERE = auto()  # by a command whose effect is not known
-    BEFORE = auto()  # the driver before ~/reload
     ANYBODY = auto()  # any program before the port was opened; counts only behind a gateway
 
 
@@ -106,12 +105,23 @@ class Claim:
         return any(extent.meets(other) for other in self.extents)
 
     def source(self, row: Mapping) -> _Source:
-        """Return who writes the words of a row, with the values if they are ours."""
+        """
+        Return who writes the words of a row, with the values if they are ours.
+
+        Values of ours stay ours when new files have another row for the same words.
+        """
         if self.write is None:
             return (_Writer.GUEST_SOMEWHERE if self.extents is None else _Writer.GUEST,)
-        if self.write.mapping is not row:
-            return (_Writer.NEIGHBOUR,)
-        return (_Writer.OURS, *self.write.raw) if self.write.is_own else (_Writer.MESSAGE,)
+        written = self.write.mapping
+        if self.write.is_own and (written.extent, written.codec) == (row.extent, row.codec):
+            return (_Writer.OURS, *self.write.raw)
+        return (_Writer.MESSAGE if written is row else _Writer.NEIGHBOUR,)
+
+
+def _key_of(claim: Claim) -> tuple[object, ...]:
+    """Return the words of a claim, and its values if they are ours: each of them may land."""
+    write = claim.write
+    return claim.station, claim.extents, write.raw if write is not None and write.is_own else None
 
 
 class WriteListener:
@@ -239,7 +249,7 @@ class WriteRecord:
         self._stations = stations
         self._opened_until = -math.inf
         self._under_way: list[Claim] = []
-        self._late: list[Claim] = []  # have ended, and may land; for equal words the last one
+        self._late: list[Claim] = []  # have ended, and may land; the last one of each _key_of
         self._words: dict[Mapping, OwnWords] = {}
         self._listeners: tuple[WriteListener, ...] = ()
         self.readers: tuple[WordsListener, ...] = ()
@@ -273,7 +283,7 @@ class WriteRecord:
         for claim in self._late:
             for row, words in self._words.items():
                 if claim.meets(row.extent):
-                    words.may_land((_Writer.BEFORE,), claim.lands_until)
+                    words.may_land(claim.source(row), claim.lands_until)
             for listener in self._listeners:
                 listener.may_land(claim)
 
@@ -317,8 +327,7 @@ class WriteRecord:
         claim.end(outcome, now, self._settle_time if may_land else landed)
         if may_land:
             self._late = [*(late for late in self._late if late.lands_until > now
-                            and (late.station, late.extents) != (claim.station, claim.extents)),
-                          claim]
+                            and _key_of(late) != _key_of(claim)), claim]
         for words in self._concerned(claim):
             words.ended(claim)
         for listener in self._listeners:

@@ -122,6 +122,19 @@ def test_rule_10_write_may_land_after_reloads_of_files_that_had_no_fallback_for_
     assert told.may_land.call_count == (until > now)
 
 
+def test_rule_19_each_value_of_ours_that_may_land_is_ours_after_reloads() -> None:
+    clock = StillClock()
+    before, after = (WriteRecord(clock, 1.0, ActiveStationList()) for _ in range(2))
+    row = beat_row()
+    for value in (3, 0):
+        write = Write(row, [value], 0.0, is_own=True)
+        before.ended(before.begin(1, [row.extent], write), Outcome.UNKNOWN, may_land=True)
+    words, others = (after.words_of(made) for made in (beat_row(), beat_row(address='N10:1')))
+    after.take_over(before)
+    assert [words.may_hold(value) for value in (3, 0, 4)] == [True, True, False]
+    assert not others.may_hold(3)
+
+
 @pytest.mark.parametrize('is_lost', [True, False])  # else it gives way to a machine of new files
 def test_rule_10_write_that_ends_with_the_port_may_land_for_its_time_from_then_on(
         is_lost: bool) -> None:

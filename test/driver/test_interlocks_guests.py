@@ -15,6 +15,7 @@
 """Guests and gateways that hold commands, beside heartbeats and fallback values."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from itertools import count
 import math
@@ -144,6 +145,39 @@ def test_rule_19_own_heartbeats_that_a_gateway_holds_are_no_other_program(
     assert cell.bench.driver.interlocks.heartbeats[0].why_not(cell.now) == ''
 
 
+@pytest.mark.parametrize('has_speed', [True, False])  # in the new files
+def test_rule_19_own_0_of_an_end_that_lands_after_a_reload_is_no_other_program(
+        has_speed: bool) -> None:
+    """The heartbeat counts by then, and a read finds the 0."""
+    beat, speed = (make_mapping(address, command, tag=tag, period=period, fallback=fallback, via=7)
+                   for address, command, tag, period, fallback in (
+                       ('N10:0', 'Heartbeat', 'beat', 300, None),
+                       ('N7:0', 'Write', 'speed', None, FALLBACK)))
+    cell = Cell(beat, speed, start=False)
+    cell.put_behind_gateway(run=5.0)
+    left = [1]
+
+    def is_meant(command: Packet) -> bool:
+        is_zero = command.data[:1] == b'\x67' and command.data[-2:] == b'\0\0'
+        left[0] -= is_zero
+        return is_zero and left[0] == 0
+
+    hold(cell, 0.95, is_meant)
+    interlocks = cell.bench.driver.interlocks
+    interlocks.wind_down()
+    cell.bench.line.wake(cell.bench.driver.machine)
+    while not interlocks.is_over:
+        cell.run(0.01)
+    assert left[0] < 0
+    cell.bench.hand_over([replace(row) for row in (beat, speed)[:1 + has_speed]])
+    seen = list[int]()
+    for _ in range(300):
+        cell.run(0.01)
+        seen += [cell.word('N10:0')] * (seen[-1:] != [cell.word('N10:0')])
+    assert seen[:4] == [0, 1, 0, 2]  # the second 0 is the one of the end
+    assert cell.bench.listener.foreign == []
+
+
 @pytest.mark.parametrize('outcome', [Outcome.WRITTEN, Outcome.PARTLY, Outcome.FAILED])
 def test_rule_2_plc_behind_a_gateway_that_answers_at_all_is_a_first_contact(
         outcome: Outcome) -> None:
@@ -176,6 +210,34 @@ def test_rule_8_guests_write_over_a_0_is_written_over_at_once(times: int) -> Non
     cell.run(0.1)
     assert cell.word('N10:0') == 0
     assert cell.bench.listener.foreign == []
+
+
+@pytest.mark.parametrize('is_refused', [True, False])  # else it is carried out, unseen by us
+def test_rule_8_guests_write_over_the_0_before_a_number_that_is_not_confirmed_is_written_over(
+        is_refused: bool) -> None:
+    cell = GuestCell(beat_row(1000), start=False)
+    numbers = list[int]()
+    serve = cell.plc.serve
+
+    def leave_out(command: Packet) -> Packet:
+        is_first = command.data[:1] == b'\x67' and command.data[-2:] != b'\0\0' and not numbers
+        if not is_first:
+            return serve(command)
+        numbers.append(command.data[-2])
+        reply = command.reply(sts=0x10) if is_refused else serve(command)
+        return reply if is_refused else reply._replace(tns=reply.tns ^ 0x8000)
+
+    cell.plc.serve = leave_out  # type: ignore[method-assign]
+    cell.bench.open()
+    while not numbers:
+        cell.run(0.01)
+    cell.run(0.7)  # the number is repeated after a Period
+    asked = cell.now
+    cell.ask('N10:0', 99)
+    cell.run(4.0)
+    since = [value for when, name, value in cell.writes if name == 'N10:0' and when >= asked]
+    assert since[:2] == [99, 0]
+    assert [value for value in since if value][1] == numbers[0]
 
 
 def test_rule_8_command_that_nobody_knows_refreshes_and_holds_no_heartbeat() -> None:

@@ -246,7 +246,7 @@ class DriverBench:
         self.open()
 
     def hand_over(self, mappings: Sequence[Mapping], first_tns: int = 0) -> None:
-        """Go on with a driver of new files, which knows what the last one knows, as the link does."""
+        """Go on with a driver of new files that knows what the last one knows, like the link."""
         before, self.mappings = self.driver, mappings
         settings = replace(self._settings, first_tns=first_tns)
         driver = Driver(self.network, mappings, settings, self.listener)

@@ -134,6 +134,7 @@ class HeartbeatRow:
         self._timeout = (mapping.condition and mapping.condition.timeout or 0) / 1000
         self._period = mapping.period / 1000
         self._is_confirmed = False
+        self._stands = 0  # the value that was confirmed last
         self.next_beat = -math.inf
         self._other = OtherWriter(self._period, dice)
         self._holds_at = math.inf  # until when all ``topics`` have a message in time
@@ -193,8 +194,12 @@ class HeartbeatRow:
             self.overwritten(now)
 
     def overwritten(self, now: float) -> None:
-        """Write 0 again at once if the PLC has to hold 0: another value may have replaced it."""
-        if self.value:
+        """
+        Write 0 again at once if the PLC may hold 0: another value may have replaced it.
+
+        Until a number is confirmed, the PLC may still hold the 0 before it.
+        """
+        if self.value and self._stands:
             return
         if self.state in (BeatState.SHOWN, BeatState.COUNTS):  # the 0 has to stand anew
             self.state = BeatState.CONTACT
@@ -329,7 +334,7 @@ class HeartbeatRow:
         self.due = now
         if outcome is not Outcome.WRITTEN:
             return
-        self._is_confirmed, self.confirmed = True, now
+        self._is_confirmed, self.confirmed, self._stands = True, now, self.value
         if self.value:
             return
         self.words.plan_again(self.tried)
