@@ -21,9 +21,9 @@ Run it beside the bridge; it prints every change of its decision::
     python3 examples/interlock_consumer.py --topic /abdf1/read/cell_interlocks --bits 0,1,2
     ros2 service call /interlock_consumer/reset std_srvs/srv/Trigger
 
-All bits have to be 1. A person has to reset at the start, and each time after values have stopped;
-with --latch also after a bit was 0. This is not a safety function: emergency stops and guards stay
-hard-wired or safety-rated.
+All bits have to be 1, and only one publisher may be alive. A person has to reset at the start, and
+each time after values have stopped or a second publisher has come; with --latch also after a bit
+was 0. This is not a safety function: emergency stops and guards stay hard-wired or safety-rated.
 
 Exit status: 0 after Ctrl-C or SIGTERM, 2 for bad arguments.
 """
@@ -54,6 +54,10 @@ class InterlockConsumer(Node):
     """
     Permits motion only while values are fresh and 1, after a person has pressed reset.
 
+    While two publishers are alive it permits nothing: a forgotten test or a recording that is
+    played looks like the bridge. It counts by liveliness, because the ROS graph has a killed node
+    for 20 s more.
+
     - ``bits``: indexes in the array; all these bits have to be 1
     - ``latches``: a person has to reset also after a bit was 0
     - ``address``: address in the PLC that the topic has to come from; empty: any
@@ -71,6 +75,7 @@ class InterlockConsumer(Node):
         self._text = ''
         self._is_fresh = False
         self._is_reset = False
+        self._alive = 0  # number of living publishers
         self._why_not = 'no value yet'  # why the PLC does not permit motion; empty if it does
         self.permitted = False
         time = Duration(seconds=patience)
@@ -78,11 +83,13 @@ class InterlockConsumer(Node):
             depth=1, reliability=ReliabilityPolicy.RELIABLE,
             durability=DurabilityPolicy.TRANSIENT_LOCAL, deadline=time,
             liveliness=LivelinessPolicy.MANUAL_BY_TOPIC, liveliness_lease_duration=time)
+        self._has_events = True
         try:
             self._subscribe(topic, qos, SubscriptionEventCallbacks(
-                deadline=lambda event: self._stopped(), liveliness=self.publishers_changed,
-                incompatible_qos=self._incompatible))
+                deadline=lambda event: self._stopped(), incompatible_qos=self._incompatible,
+                liveliness=lambda event: self.publishers_changed(event.alive_count)))
         except UnsupportedEventTypeError:  # rmw_zenoh lacks these events
+            self._has_events = False
             self._subscribe(topic, qos, SubscriptionEventCallbacks())
         # DDS reports no missed deadline before the first value, and some RMWs never report one.
         # The node's own clock may be simulated and stop, so the timer uses a steady clock.
@@ -96,9 +103,11 @@ class InterlockConsumer(Node):
             UInt8MultiArray, topic, self.receive, qos, event_callbacks=events)
 
     def receive(self, message: UInt8MultiArray) -> None:
+        if not self._has_events:
+            self.publishers_changed(max(1, self._subscription.get_publisher_count()))
         self._silence.reset()
         self._is_fresh = True
-        self._why_not = self._missing_in(message)
+        self._why_not = self._crowd() or self._missing_in(message)
         if self._why_not:
             self._is_reset = self._is_reset and not self._latches
             self._decide(False, self._why_not)
@@ -119,9 +128,18 @@ class InterlockConsumer(Node):
                 return f'bit {bit} is 0'
         return ''
 
-    def publishers_changed(self, event: Any) -> None:
-        if event.alive_count <= 0:  # -1 if this subscriber joined late (Fast DDS)
+    def publishers_changed(self, alive: int) -> None:
+        """Withdraw the permit until a person resets: the publisher has died, or is not alone."""
+        has_come, self._alive = alive > self._alive, alive
+        if alive <= 0:  # -1 if another subscriber of this process came before (Fast DDS)
             self._stopped()
+        elif has_come and self._is_fresh:
+            self._is_reset = False
+            self._why_not = self._crowd() or 'another publisher has come'
+            self._decide(False, self._why_not)
+
+    def _crowd(self) -> str:
+        return f'the topic has {self._alive} publishers' if self._alive > 1 else ''
 
     def _stopped(self) -> None:
         """Withdraw the permit until a person resets; may be called twice for one silence."""

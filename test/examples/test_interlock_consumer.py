@@ -14,15 +14,18 @@
 
 """The interlock consumer, beside a bridge that loses its PLC and its life."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 import importlib.util
 from pathlib import Path
 import signal
-from types import SimpleNamespace
 
 import pytest
 import rclpy
 from rclpy import event_handler
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile
 from std_msgs.msg import MultiArrayDimension, MultiArrayLayout, UInt8MultiArray
 from std_srvs.srv import Trigger
 from support.ros import Observer, Process
@@ -117,8 +120,26 @@ def test_permit_comes_back_by_itself_only_where_that_is_wanted(latches: bool) ->
             assert not cell.permitted
         cell.receive(bits_of(1, 1))
         assert cell.permitted is not latches
-        cell.publishers_changed(SimpleNamespace(alive_count=-1))  # its change to 1 went to others
+        cell.publishers_changed(-1)  # its change to 1 went to others
         assert not cell.permitted
+        cell.destroy_node()
+    finally:
+        rclpy.shutdown()
+
+
+def test_subscriber_that_is_told_of_changes_only_notices_a_second_publisher_too() -> None:
+    rclpy.init(args=[])
+    try:
+        cell = EXAMPLE_MODULE.InterlockConsumer('/nobody/read/bits', [0], 2.0)
+        cell.receive(bits_of(1))
+        assert cell.reset(Trigger.Request(), Trigger.Response()).success
+        cell.receive(bits_of(1))
+        assert cell.permitted
+        cell.publishers_changed(1)  # of the bridge it was not told
+        assert not cell.permitted
+        assert not cell.reset(Trigger.Request(), Trigger.Response()).success
+        cell.receive(bits_of(1))
+        assert not cell.permitted, 'a person has to reset'
         cell.destroy_node()
     finally:
         rclpy.shutdown()
@@ -151,6 +172,36 @@ def test_silence_takes_the_permit_where_the_rmw_has_no_events(
         rclpy.shutdown()
 
 
+def test_second_publisher_takes_the_permit_where_the_rmw_has_no_events(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(event_handler, 'EventHandler', unsupported)
+    rclpy.init(args=[])
+    try:
+        cell = EXAMPLE_MODULE.InterlockConsumer('/nobody/read/bits', [0], 60.0)
+        node = rclpy.create_node('stubs')
+        bridge = stub_on(node, '/nobody/read/bits')
+
+        def receives(condition: Callable[[], bool]) -> bool:
+            for _ in range(400):
+                bridge.publish(bits_of(1))
+                rclpy.spin_once(cell, timeout_sec=0.1)
+                if condition():
+                    return True
+            return False
+
+        assert receives(lambda: cell.reset(Trigger.Request(), Trigger.Response()).success)
+        assert receives(lambda: cell.permitted)
+        stub = stub_on(node, '/nobody/read/bits')
+        assert receives(lambda: not cell.permitted)
+        assert not cell.reset(Trigger.Request(), Trigger.Response()).success
+        node.destroy_publisher(stub)
+        assert receives(lambda: cell.reset(Trigger.Request(), Trigger.Response()).success)
+        node.destroy_node()
+        cell.destroy_node()
+    finally:
+        rclpy.shutdown()
+
+
 def test_loss_of_the_plc_takes_the_permit_until_a_person_resets(
         files: Files, simulator: Process) -> None:
     with Observer() as observer, \
@@ -168,6 +219,44 @@ def test_loss_of_the_plc_takes_the_permit_until_a_person_resets(
         assert cell.lines[after:] == [STOPPED, WAITING]
         cell.end()
         node.end()
+
+
+def stub_on(node: Node, topic: str) -> Publisher:
+    """Return a publisher with the QoS of a bridge, as in a forgotten test or a recording."""
+    second = Duration(seconds=1)
+    return node.create_publisher(UInt8MultiArray, topic, QoSProfile(
+        depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL, deadline=second, lifespan=second,
+        liveliness=LivelinessPolicy.MANUAL_BY_TOPIC, liveliness_lease_duration=second))
+
+
+def test_second_publisher_takes_the_permit_until_it_has_gone_and_a_person_resets(
+        files: Files, simulator: Process) -> None:
+    crowd = 'the topic has 2 publishers'
+    with Observer() as observer, \
+            Process('node', *files.args(), '-r', '__node:=crowded') as node, \
+            consumer('/crowded/read/bits', '0', 'open') as cell, \
+            consumer('/crowded/read/bits', '0,1', 'shut') as shut:
+        cell.wait_for(WAITING)
+        shut.wait_for(REFUSED)
+        assert reset(observer, 'open') == (True, '')
+        cell.wait_for(PERMITTED)
+        stub = stub_on(observer.node, '/crowded/read/bits')
+        timer = observer.node.create_timer(
+            0.1, lambda: stub.publish(bits_of(1, 1, 1, 1, 1, 1, address='B3:0/2')))
+        observer.until(
+            lambda: cell.lines[-1] == shut.lines[-1] == f'not permitted: {crowd}', crowd)
+        for name in ('open', 'shut'):
+            assert reset(observer, name) == (False, f'not reset: {crowd}')
+        timer.cancel()  # its lease ends, as that of a program that was killed
+        after = len(cell.lines)
+        cell.wait_for(WAITING, after=after)
+        assert reset(observer, 'open') == (True, '')
+        cell.wait_for(PERMITTED, after=after)
+        for process in (cell, shut, node):
+            process.end()
+    assert PERMITTED not in shut.lines
+    assert cell.lines.count(PERMITTED) == 2
+    assert cell.lines.count(WAITING) == 2
 
 
 def test_kill_of_the_bridge_takes_the_permit_and_its_restart_does_not_give_it_back(
