@@ -166,8 +166,8 @@ COUNTERS: dict[str, str] = {
     'replies_received': 'Should keep up with CNT_CMD_MSGS_SENT.',
     'polls_sent': 'Masters only. Many polls for one reply: the PLC is slow and costs line time.',
     'polls_received': 'Mode Slave only. Stays the same: the master does not poll us.',
-    'naks_sent': 'Masters: one NAK for each 2508 with `nak_on_command_timeout`. Peer: damaged '
-                 'messages.',
+    'naks_sent': 'Masters: one NAK for each 2508, where `nak_on_command_timeout` lets it go out. '
+                 'Peer: damaged messages.',
     'naks_received': 'Peer: our messages arrive damaged, or the PLC has no room. Masters: 2511.',
     'acks_sent': 'Good messages that we have received.',
     'acks_received': 'Messages of ours that other nodes have received. In Mode Slave also ACKs '

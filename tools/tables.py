@@ -124,7 +124,8 @@ def parameters() -> str:
     rows = []
     for entry in fields(Parameters):
         low, high = entry.metadata['low'], entry.metadata['high']
-        limits = '' if low is None else f'{low:.15g} to {high:.15g}'
+        limits = ', '.join(entry.metadata['choices']) if low is None \
+            else f'{low:.15g} to {high:.15g}'
         rows.append((_code(entry.name), _default(entry.default), limits,
                      entry.metadata['description']))
     return table(('parameter', 'default', 'range', 'meaning'), rows)

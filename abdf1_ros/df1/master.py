@@ -46,7 +46,7 @@ from abdf1_ros.df1.machine import Heard, Machine, Procedure, Rest, Send, Step
 from abdf1_ros.df1.master_line import MasterLine, MOST_QUEUED, poll_on_ack
 from abdf1_ros.df1.mode import LineMode
 from abdf1_ros.df1.packet import BROADCAST, Packet
-from abdf1_ros.df1.settings import LinkSettings
+from abdf1_ros.df1.settings import LinkSettings, PollingSettings
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task, TaskSource
 from abdf1_ros.errors import CommandExpired, CommandTimeout, StationInactive
@@ -150,9 +150,19 @@ class HalfDuplexMaster(Link):
     def _give_up(self, task: Task) -> Procedure:
         """Count and report a reply that did not come in time (S0, counter 2545)."""
         self._line.accounting.late(task, keeps_others_waiting=True)
-        if self._settings.nak_on_command_timeout:
+        if self._resets_slaves:
             self._line.counters.naks_sent += 1
             yield Send(frames.NAK)
+
+    @property
+    def _resets_slaves(self) -> bool:
+        """Tell whether an overdue reply may make all slaves of the line drop what they hold."""
+        wanted = self._settings.nak_on_command_timeout
+        if wanted is not None:
+            return wanted
+        polling = self._settings.polling or PollingSettings(())
+        named = {*self._stations.records, *polling.priority, *polling.normal}
+        return len(named - {self._settings.station, BROADCAST}) <= 1
 
 
 class MasterMode(LineMode):

@@ -47,8 +47,12 @@ class LinkOptions:
     duplicate_detection: bool = True
     """Acknowledge a repeated message, but do not execute it again."""
 
-    nak_on_command_timeout: bool = True
-    """A master sends DLE NAK if a reply is overdue: then slaves drop their messages (M 2-7)."""
+    nak_on_command_timeout: bool | None = None
+    """
+    A master sends DLE NAK if a reply is overdue: then all slaves drop their messages (M 2-7).
+
+    None: only while no second station of the line has been named.
+    """
 
     accept_slave_messages: bool = True
     """A master serves commands of slaves or passes them on; otherwise it drops them."""

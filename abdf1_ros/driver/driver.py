@@ -41,6 +41,7 @@ last value, freshness, withheld                     ``reads.point.ReadPoint``
 from __future__ import annotations
 
 from collections.abc import Callable, Container, Iterable, Sequence
+from dataclasses import replace
 from typing import Protocol
 
 from abdf1_ros.counters import Counters
@@ -48,6 +49,7 @@ from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.listen import ListeningMachine
 from abdf1_ros.df1.machine import Procedure
 from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.settings import LinkOptions
 from abdf1_ros.df1.stations import ActiveStationList, Station
 from abdf1_ros.df1.tasks import Task
 from abdf1_ros.driver.agenda import Agenda, QUESTION_PERIOD
@@ -76,6 +78,7 @@ from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
+from abdf1_ros.settings.resets import lost_by_reset
 from abdf1_ros.settings.rows import Rows
 
 _NOT_OPEN = 'the port is not open'
@@ -128,11 +131,18 @@ class Driver:
         self._inbox: Inbox[Write] = Inbox(is_open=False)
         self._make_queues()
         self.link = network.line_mode.make_link(
-            self.machine, network.link(settings), self.stations, self.serve, listener.happened)
+            self.machine, network.link(self._options()), self.stations, self.serve,
+            listener.happened)
         self.overheard: Overheard | None = None
         if isinstance(self.machine, ListeningMachine):
             self.overheard = self.machine.listener = Overheard(
                 network, self.mappings, self.readings, self.stations, self.checks, self.tasks)
+
+    def _options(self) -> LinkOptions:
+        """Return the options of the link: a DLE NAK of ours destroys nothing that others miss."""
+        is_open = self._settings.nak_on_command_timeout is None
+        return replace(self._settings, nak_on_command_timeout=False) \
+            if is_open and lost_by_reset(self.network, self.mappings) else self._settings
 
     def _make_queues(self) -> None:
         """Make the queues of jobs, and the agenda that decides between them."""

@@ -41,6 +41,7 @@ from abdf1_ros.settings import BAUD_RATES
 from abdf1_ros.settings.mapping import Command, Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.remarks import network_remarks
+from abdf1_ros.settings.resets import lost_by_reset
 from abdf1_ros.settings.rows import Rows
 from abdf1_ros.settings.share import share_places
 from abdf1_ros.text import counted, first, milliseconds
@@ -179,6 +180,9 @@ class Report:
             found.append(f'alarms on /diagnostics: {_tags(alarms)}')
         if self.mappings.on_demand:
             found.append(f'read on demand alone, by ~/read_now: {self._on_demand()}')
+        if self.mappings.served and (lost := lost_by_reset(self.network, self.mappings)):
+            found.append('with the parameter nak_on_command_timeout true, each overdue reply '
+                         f'would make all slaves drop what they have queued: {"; ".join(lost)}')
         if gaps := '; '.join(_unprotected(self.mappings)):
             found.append(f'nothing protects: {gaps}')
         return found

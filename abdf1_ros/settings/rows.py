@@ -72,6 +72,12 @@ class Rows(tuple[Mapping, ...]):
         return tuple(dict.fromkeys(row.station for row in self.of_plcs
                                    if row.station != BROADCAST))
 
+    @cached_property
+    def asked(self) -> frozenset[int]:
+        """Return the stations that we send to, gateways included."""
+        return frozenset(self.stations) | {
+            row.via for row in self.of_plcs if row.via is not None}
+
     def without(self, others: Iterable[Mapping]) -> Rows:
         """Return the rows that are not among ``others``."""
         left_out = {*others}

@@ -283,7 +283,7 @@ def test_rule_20_what_nothing_protects_is_one_note() -> None:
                make_mapping('N10:0', 'Heartbeat', tag='beat', period=1000,
                             condition=While(('speed',), 10_000)),
                make_mapping('N7:9', 'Serve', station=5, tag='pushed', period=1000)]
-    assert report_of(*guarded).notes() == []
+    assert report_of(*guarded, mode='Peer').notes() == []
     bare = [make_mapping('N7:1', 'Write', tag='word'), make_mapping('B3:0/2', 'Write', tag='bit'),
             make_mapping('N7:3', 'ReadWrite', tag='recipe'),
             make_mapping('O:001', 'Write', tag='lamp'),
@@ -292,12 +292,24 @@ def test_rule_20_what_nothing_protects_is_one_note() -> None:
             make_mapping('N10:6', 'Heartbeat', tag='slow', period=1000,
                          condition=While(('speed',), 10_001)),
             make_mapping('N7:8', 'Serve', station=5, tag='silent')]
-    note, = report_of(*guarded, *bare).notes()
+    note, = report_of(*guarded, *bare, mode='Peer').notes()
     assert note == (
         'nothing protects: 4 of 5 written rows, without Fallback: lamp, bit, word and 1 more; '
         'heartbeats without While, which count even if no program publishes: bare; While_Timeout '
         'over 10 s: slow; topics of Serve rows without Period, so a PLC that stops is not '
         'noticed: silent')
+
+
+def test_what_a_reset_of_the_slaves_would_destroy_is_noted_where_rows_wait_for_messages() -> None:
+    rows = [make_mapping('N7:0', station=2, plc='SLC', via=8),
+            make_mapping('N7:8', 'Serve', station=5, tag='pushed', period=1000)]
+    note, = report_of(*rows).notes()
+    assert note == (
+        'with the parameter nak_on_command_timeout true, each overdue reply would make all slaves '
+        'drop what they have queued: messages of stations 2, 8; messages of slaves for pushed')
+    for mode in ({'polling': 'Standard'}, {'mode': 'Peer'}):
+        assert report_of(*rows, **mode).notes() == []
+    assert report_of(rows[0]).notes() == []
 
 
 def test_bits_that_go_on_without_the_program_are_noted_and_are_not_odd() -> None:

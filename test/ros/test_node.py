@@ -488,6 +488,16 @@ def test_load_that_the_line_cannot_carry_is_told_before_other_remarks(
     assert '; or Period ' in warnings[0] and len(warnings) == 20
 
 
+@pytest.mark.parametrize(('given', 'is_told'), [((), False), (('true',), True)])
+def test_reset_of_all_slaves_is_told_where_it_is_forced(
+        make_bench: Benches, capfd: Output, given: tuple[str, ...], is_told: bool) -> None:
+    make_bench('a,Read,N7:0,1,PLC5,1,', 'b,Serve,N7:9,5,PLC5,1,', parameters=tuple(
+        f'nak_on_command_timeout:={value}' for value in given))
+    told = ''.join(capfd.readouterr())
+    assert ('nak_on_command_timeout: each overdue reply makes all slaves drop what they have '
+            'queued: messages of slaves for b\n' in told) is is_told
+
+
 def test_map_without_a_row_is_told(make_bench: Benches, capfd: Output) -> None:
     make_bench(parameters=('map.gate.max:=7', 'read_only:=true'))
     told = ''.join(capfd.readouterr())

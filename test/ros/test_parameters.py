@@ -131,7 +131,18 @@ def test_defaults_are_those_of_the_contract() -> None:
     assert (parameters.strict_map, parameters.read_only) == (False, False)
     assert (parameters.default_period, parameters.diagnostics_period) == (100, 1.0)
     assert (parameters.stale_after, parameters.write_timeout) == (3.0, 2.0)
-    assert (parameters.nak_on_command_timeout, parameters.expose_map_parameters) == (True, True)
+    assert (parameters.nak_on_command_timeout, parameters.expose_map_parameters) == ('auto', True)
+
+
+@pytest.mark.parametrize(('given', 'meant'), [
+    (True, True), (False, False), ('auto', None), ('True', True), ('false', False)])
+def test_yes_and_no_of_a_file_and_of_a_launch_argument_say_when_slaves_are_reset(
+        configured: Configured, make_node: Nodes, files: Files, given: bool | str,
+        meant: bool | None) -> None:
+    assert configured().driver_settings().nak_on_command_timeout is None
+    node = make_node(files | {'nak_on_command_timeout': given})
+    assert configure(node).driver_settings().nak_on_command_timeout is meant
+    assert node.get_parameter('nak_on_command_timeout').value == given  # as a dump has it
 
 
 def test_every_parameter_is_declared_read_only_with_a_description(
@@ -277,6 +288,10 @@ def test_gateway_is_polled_for_the_stations_behind_it(
                              '0 to 255: write it without quotes'),
     ('default_period', '1.5', "default_period = '1.5' should be a whole number from 0 to "
                               '86400000'),
+    ('nak_on_command_timeout', 'never',
+     "nak_on_command_timeout = 'never' should be one of auto, true, false"),
+    ('nak_on_command_timeout', 1,
+     'nak_on_command_timeout = 1 should be one of auto, true, false'),
     ('map_file', [1, 2], 'map_file = [1, 2] should be text'),
     *((name, value, f'{name} = {value} should be text: {YAML_MAKES} {made}; leave {name} out, or '
        'write ./ before the name of a file')

@@ -79,8 +79,10 @@ class OddDevice:
     """
     A device; ``nodes`` have the words ``words[node, file, element]``.
 
-    ``takes`` says what becomes of a message by its link data, ``hear`` and ``say`` what comes
-    through. ``executed`` has the link data of all commands.
+    ``takes`` says what becomes of a message by its link data, ``seconds`` how long the work on it
+    takes, ``hear`` and ``say`` what comes through. ``executed`` has the link data of all commands,
+    ``answered`` those of the replies to its own messages, ``flushed`` those of all that a master
+    has made it drop.
     """
 
     next_call: float | None = None
@@ -97,9 +99,12 @@ class OddDevice:
         self.knows_commands = True
         self.words: dict[tuple[int, int, int], int] = {}
         self.takes: Callable[[bytes], Answer] = lambda data: Answer.ACK
+        self.seconds: Callable[[bytes], float] = lambda data: 0.0
         self.hear: Callable[[bytes], bytes] = bytes
         self.say: Callable[[bytes], bytes] = bytes
         self.executed: list[bytes] = []
+        self.answered: list[bytes] = []
+        self.flushed: list[bytes] = []
         self._buffer = self._out = b''
         self._replies: defaultdict[int, deque[bytes]] = defaultdict(deque)  # by station
         self._to_come: list[tuple[float, bytes]] = []
@@ -151,6 +156,11 @@ class OddDevice:
         if pair == ACK and self._polled_station is not None:
             self._replies[self._polled_station].popleft()
             self._polled_station = None
+        elif pair == NAK and self.wiring is Wiring.HALF:  # M 2-7, 3-11
+            for queue in self._replies.values():
+                self.flushed += queue
+                queue.clear()
+            self._polled_station = None
         elif pair == ENQ and self.wiring is Wiring.FULL:
             self._out += self._response
         return True
@@ -192,15 +202,21 @@ class OddDevice:
         if self.wiring is not Wiring.RADIO:
             self._response = NAK if answer is Answer.NAK else ACK
             self._out += self._response
-        if data[2] & _REPLY or data == self._last:
+        if data[2] & _REPLY:
+            self.answered.append(data)
+        elif data == self._last:
             return
-        if answer is Answer.LATE:
+        elif answer is Answer.LATE:
             self._last = data
-            self._to_come.append((self._now + self.late, _reply_to(data, _NOT_DELIVERED)))
-            self._plan()
+            self._send_after(self.late, _reply_to(data, _NOT_DELIVERED))
         elif answer in (Answer.ACK, Answer.REFUSES):
             self._last = data
             self._execute(data, answer is Answer.REFUSES)
+
+    def _send_after(self, seconds: float, reply: bytes) -> None:
+        self._to_come.append((self._now + seconds, reply))
+        self._to_come.sort()
+        self._plan()
 
     def _plan(self) -> None:
         self.next_call = self._to_come[0][0] if self._to_come else None
@@ -213,7 +229,15 @@ class OddDevice:
         elif data[0] in self.nodes | {self.station} or (
                 self.executes_diagnostics and data[2] == _ECHO):
             status, result = self.answer(data)
-        self._send(_reply_to(data, status) + result)
+        reply = _reply_to(data, status) + result
+        if seconds := self.seconds(data):
+            self._send_after(seconds, reply)
+        else:
+            self._send(reply)
+
+    def send(self, message: bytes) -> None:
+        """Send a message of its own: its link data; in half duplex it waits for a poll."""
+        self._send(message)
 
     def _send(self, reply: bytes) -> None:
         if self.wiring is Wiring.HALF:

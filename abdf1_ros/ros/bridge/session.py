@@ -27,7 +27,6 @@ import math
 import random
 import time
 
-from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.pccc.values import Values
 from abdf1_ros.plan.forecast import USUAL_RESPONSE_TIME
@@ -54,7 +53,7 @@ from abdf1_ros.ros.topics.snapshot import Snapshot
 from abdf1_ros.ros.topics.writes import WriteTopic, WriteTopics
 from abdf1_ros.ros.untyped import RosPublisher
 from abdf1_ros.settings.mapping import Mapping
-from abdf1_ros.settings.rows import Rows
+from abdf1_ros.settings.resets import lost_by_reset
 from abdf1_ros.text import first, printable
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
@@ -122,7 +121,7 @@ class BridgeSession:
                     diagnostics_period=parameters.diagnostics_period,
                     is_waiting=lambda: self.is_waiting)
         self.events = LineEvents(
-            node.get_logger(), self.port, stations_of(mappings),
+            node.get_logger(), self.port, mappings.asked,
             scans=not network.line_mode.has_one_plc, seen=seen, read=self._reader(),
             results=surroundings.results, table_changed=self._publish_active,
             answer=surroundings.services.take)
@@ -375,13 +374,6 @@ def tell_plcs(sessions: Sequence[BridgeSession], what: str, limit: float) -> Non
         session.wait_for_plcs(give_up, what)
 
 
-def stations_of(mappings: Rows) -> frozenset[int]:
-    """Return the stations that the bridge sends to, including gateways."""
-    numbers = {number for mapping in mappings.of_plcs
-               for number in (mapping.station, mapping.via) if number is not None}
-    return frozenset(numbers - {BROADCAST})
-
-
 def _tell_files(logger: RcutilsLogger, configuration: Configuration) -> None:
     """Log a summary of both files."""
     logger.info(str(configuration))
@@ -400,6 +392,10 @@ def _tell_files(logger: RcutilsLogger, configuration: Configuration) -> None:
     if configuration.idle:
         logger.warning(f'{first(configuration.idle)} without effect: only for Mode Master with '
                        'Polling Standard')
+    lost = lost_by_reset(configuration.network, configuration.mappings)
+    if configuration.driver_settings().nak_on_command_timeout and lost:
+        logger.warning('nak_on_command_timeout: each overdue reply makes all slaves drop what '
+                       f'they have queued: {"; ".join(lost)}')
     if configuration.ignored:
         logger.warning(
             'parameters without effect, because only the map file counts: '

@@ -52,8 +52,12 @@ _Default = TypeVar('_Default', bound=bool | float | str)
 
 
 def _parameter(default: _Default, description: str, low: float | None = None,
-               high: float | None = None) -> _Default:
-    return field(default=default, metadata={'description': description, 'low': low, 'high': high})
+               high: float | None = None, choices: Collection[str] = ()) -> _Default:
+    return field(default=default, metadata={
+        'description': description, 'low': low, 'high': high, 'choices': choices})
+
+
+_YES_OR_BY_LINE = {'auto': None, 'true': True, 'false': False}
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,8 +88,9 @@ class Parameters:
         10.0, 's between questions for type, mode and faults of each processor; 0: never',
         0.0, 3600.0)
     write_timeout: float = _parameter(2.0, 's that a write may wait for the line', 0.05, 60.0)
-    nak_on_command_timeout: bool = _parameter(
-        True, 'send DLE NAK, which resets all slaves, when a reply does not come in time')
+    nak_on_command_timeout: str = _parameter(
+        'auto', 'send DLE NAK, which resets all slaves, when a reply does not come in time; auto: '
+        'only where it destroys nothing that is waited for', choices=_YES_OR_BY_LINE)
     max_outstanding: int = _parameter(
         1, 'most commands that wait for a reply at the same time, Mode Peer only', 1, 16)
     accept_slave_messages: bool = _parameter(
@@ -167,7 +172,9 @@ class Configuration:
         same = {entry.name: getattr(self.parameters, entry.name)
                 for entry in fields(DriverSettings) if entry.name in own}
         return replace(
-            DriverSettings(**same), may_store='://' in self.port,
+            DriverSettings(**same),
+            nak_on_command_timeout=_YES_OR_BY_LINE[self.parameters.nak_on_command_timeout],
+            may_store='://' in self.port,
             default_period=self.parameters.default_period / 1000,
             polling=self.polling, first_tns=random.randrange(0x10000))
 
@@ -418,7 +425,8 @@ def _declare_own(node: Node, given: Given, problems: list[Problem]) -> Parameter
         value = _declare(node, given, entry.name, default, descriptor_of(
             default, entry.metadata['description'], low, high, read_only=True))
         try:
-            values[entry.name] = usable(entry.name, value, default, low, high)
+            values[entry.name] = usable(
+                entry.name, value, default, low, high, entry.metadata['choices'])
         except ValueError as error:
             problems.append(Problem(f'parameter {entry.name}', str(error)))
             values[entry.name] = default

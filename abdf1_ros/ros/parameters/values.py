@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any
 
 import yaml
@@ -28,13 +29,18 @@ _KINDS = {bool: 'true or false', int: 'a whole number', float: 'a number', str: 
 
 
 def usable(name: str, value: object, default: bool | float | str, low: float | None = None,
-           high: float | None = None) -> Any:
+           high: float | None = None, choices: Collection[str] = ()) -> Any:
     """
     Return the value of a parameter, of the type of ``default``.
 
-    ``low`` and ``high`` are its range. Raises ValueError, with the cure, for any other value. YAML
-    makes a bool or a number of many a word; which word it was cannot be known any more.
+    ``low`` and ``high`` are its range; ``choices`` has its only texts, and a bool may be one of
+    them. Raises ValueError, with the cure, for any other value. YAML makes a bool or a number of
+    many a word; which word it was cannot be known any more.
     """
+    if choices:
+        if (text := str(value).lower()) in choices:
+            return text
+        raise ValueError(f'{name} = {value!r} should be one of {", ".join(choices)}')
     kind: type = type(default)
     taken = _taken_as(kind, name, value)
     if type(taken) is kind and _is_within(taken, low, high):
