@@ -16,13 +16,21 @@
 Start the bridge.
 
 Every parameter of the node is an argument here. An empty argument is not passed on: then the
-parameter file or the node's default decides. An unknown argument ends the launch. ``ros2 launch
-abdf1_ros bridge.launch.py --show-args`` lists all arguments.
+parameter file or the node's default decides. An unknown argument ends the launch; in a launch file
+that includes this one, a misspelt protection does. ``ros2 launch abdf1_ros bridge.launch.py
+--show-args`` lists all arguments.
 """
 
 import sys
 
-from abdf1_ros.ros.launching import descriptions, parameter_types, scope_of, unknown_arguments
+from abdf1_ros.ros.launching import (
+    descriptions,
+    misspelt,
+    parameter_types,
+    scope_of,
+    unknown_arguments,
+    unusable,
+)
 from launch import LaunchContext, LaunchDescription, LaunchDescriptionEntity
 from launch.actions import (
     DeclareLaunchArgument,
@@ -32,6 +40,7 @@ from launch.actions import (
     TimerAction,
 )
 from launch.events.process import ProcessExited
+from launch.logging import get_logger
 from launch.substitutions import TextSubstitution
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterFile, ParameterValue
@@ -49,12 +58,17 @@ def start_node(context: LaunchContext) -> list[LaunchDescriptionEntity]:
     """Return the node, with the given arguments."""
     # A copy, because the context may have changed when the node ends.
     arguments = dict(context.launch_configurations)
-    problems = unknown_arguments(__file__, [*OWN, *parameter_types()], sys.argv)
+    known = [*OWN, *parameter_types()]
+    misspelt_ones, warnings = misspelt(known, arguments)
+    problems = unknown_arguments(__file__, known, sys.argv) or misspelt_ones
+    problems += unusable(arguments)
     if not arguments['params_file']:
         problems += [f'{name}: which file? Give {name}:=FILE.csv, or params_file:=FILE.yaml'
                      for name in ('net_file', 'map_file') if not arguments[name]]
     if problems:
         raise RuntimeError('; '.join(problems))
+    for text in warnings:
+        get_logger('bridge.launch.py').warning(text)
     return [bridge(arguments, OpaqueFunction(function=scope_of(context)))]
 
 

@@ -23,7 +23,7 @@ launch.
 
 import sys
 
-from abdf1_ros.ros.launching import parameter_types, scope_of, unknown_arguments
+from abdf1_ros.ros.launching import misspelt, parameter_types, scope_of, unknown_arguments
 from launch import LaunchContext, LaunchDescription
 from launch.actions import (
     DeclareLaunchArgument,
@@ -35,6 +35,7 @@ from launch.actions import (
 from launch.conditions import IfCondition, UnlessCondition
 from launch.events.process import ProcessExited
 from launch.launch_description_sources import PythonLaunchDescriptionSource
+from launch.logging import get_logger
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution, ThisLaunchFileDir
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterFile
@@ -82,9 +83,12 @@ def all_lines(restore: OpaqueFunction) -> Node:
 
 def refuse_unknown(context: LaunchContext) -> None:
     """Raise RuntimeError for an unknown argument: parameters belong in the file."""
-    problems = unknown_arguments(__file__, ('lines_file', 'one_process'), sys.argv)
-    if problems:
+    known = 'lines_file', 'one_process'
+    misspelt_ones, warnings = misspelt(known, context.launch_configurations)
+    if problems := unknown_arguments(__file__, known, sys.argv) or misspelt_ones:
         raise RuntimeError('; '.join(problems))
+    for text in warnings:
+        get_logger('three_lines.launch.py').warning(text)
 
 
 def generate_launch_description() -> LaunchDescription:

@@ -38,7 +38,8 @@ for name in ('launch', 'launch_ros', 'ros2launch'):
 
 LAUNCH = SOURCE / 'launch'
 FILES = sorted(path.name for path in LAUNCH.glob('*.launch.py'))
-EXAMPLE = [f'{name}_file:={config_file(f"{name}.csv")}' for name in ('net', 'map')]
+FILES_GIVEN = {f'{name}_file': str(config_file(f'{name}.csv')) for name in ('net', 'map')}
+EXAMPLE = [f'{name}:={path}' for name, path in FILES_GIVEN.items()]
 # Before every line of a node stands which one it is.
 LOG_LINE = re.compile(r'\[node-\d\] \S*\[([A-Z]+)\] \[[\d.]+\] \[([^]]+)\]: ')
 
@@ -102,6 +103,67 @@ def test_argument_that_does_not_exist_ends_the_launch(
     assert process.result() == 1
     assert f'{argument.partition(":")[0]}: there is no such argument; {told}' in process.text
     assert 'process started' not in process.text
+
+
+@pytest.mark.parametrize('file, name, cure', [
+    ('bridge', 'readonly', 'did you mean read_only? '),
+    ('three_lines', 'read_only', 'write read_only into the parameter file. ')])
+def test_protection_that_does_not_reach_the_bridge_ends_the_launch_that_includes_it(
+        tmp_path: Path, file: str, name: str, cure: str) -> None:
+    robot = including(tmp_path, file, **FILES_GIVEN if file == 'bridge' else {}, **{name: 'true'})
+    process = ros2('launch', str(robot))
+    assert process.result() == 1
+    assert (f'{name} = "true": there is no such argument; {cure}If it is meant for another launch '
+            'file, include this one in a group, with read_only "false"') in process.text
+    assert 'process started' not in process.text
+
+
+def test_other_misspelt_argument_of_an_include_is_warned_of(tmp_path: Path) -> None:
+    robot = including(tmp_path, 'bridge', **FILES_GIVEN, loglevel='fatal', port='/dev/ttyS99')
+    process = ros2('launch', str(robot))
+    process.wait_for('/dev/ttyS99: cannot open the port')
+    assert '[WARNING] [bridge.launch.py]: loglevel = "fatal": there is no such argument, so it ' \
+        'has no effect; did you mean log_level?' in ended(process)
+
+
+def including(folder: Path, file: str, **arguments: str) -> Path:
+    """Return a launch file of a robot in Python that includes one of the package."""
+    robot = folder / 'robot.launch.py'
+    robot.write_text(
+        'from launch import LaunchDescription\n'
+        'from launch.actions import IncludeLaunchDescription\n'
+        'def generate_launch_description():\n'
+        f'    return LaunchDescription([IncludeLaunchDescription('
+        f'{str(LAUNCH / f"{file}.launch.py")!r}, launch_arguments={arguments}.items())])\n',
+        encoding='utf-8')
+    return robot
+
+
+@pytest.mark.parametrize('argument, told', [
+    ('read_only:=maybe', "read_only = 'maybe' should be true or false"),
+    ('trace_file:=off', 'trace_file = False should be text: YAML makes true or false of words')])
+def test_value_that_cannot_be_meant_ends_the_launch_with_its_name(
+        launch: Starter, argument: str, told: str) -> None:
+    process = launch('bridge.launch.py', *EXAMPLE, argument)
+    assert process.result() == 1
+    assert told in process.text
+    assert 'process started' not in process.text
+
+
+def test_text_where_a_bool_is_meant_ends_the_node(tmp_path: Path) -> None:
+    robot = tmp_path / 'robot.launch.py'
+    robot.write_text(
+        'from launch import LaunchDescription\n'
+        'from launch_ros.actions import Node\n'
+        'def generate_launch_description():\n'
+        "    return LaunchDescription([Node(package='abdf1_ros', executable='node', "
+        f"output='screen', parameters=[{FILES_GIVEN | {'read_only': 'true'}}])])\n",
+        encoding='utf-8')
+    process = ros2('launch', str(robot))
+    process.wait_for("read_only = 'true' is a text and should be true or false: write it without "
+                     'quotes, in Python True')
+    process.result()
+    assert 'exit code 2' in process.text
 
 
 def test_bridge_needs_its_files(launch: Starter) -> None:

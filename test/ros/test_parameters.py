@@ -23,7 +23,14 @@ from typing import Any
 from abdf1_ros.df1.settings import PollingSettings
 from abdf1_ros.paths import config_file
 from abdf1_ros.problems import ConfigurationError
-from abdf1_ros.ros.launching import descriptions, parameter_types, scope_of, unknown_arguments
+from abdf1_ros.ros.launching import (
+    descriptions,
+    misspelt,
+    parameter_types,
+    scope_of,
+    unknown_arguments,
+    unusable,
+)
 from abdf1_ros.ros.parameters.arguments import Arguments, is_for
 from abdf1_ros.ros.parameters.declared import Configuration, configure, Parameters
 from abdf1_ros.ros.parameters.files import parameter_tree
@@ -392,6 +399,7 @@ def test_parameter_file_sets_parameters_of_node_and_net(
     ('map.recipe.addres', 'map.* only shows the map file: change the file'),
     ('qos_overrides./parameters/read/door.publisher.depth', 'the QoS of our topics follows'),
     ('net.speed', 'net.* has the columns of the net file'),
+    ('READ_ONLY', 'did you mean read_only?'),
     ('prot', 'did you mean port?'), ('map_fil', 'did you mean map_file?')])
 def test_misspelt_parameter_is_an_error(
         make_node: Nodes, files: Files, name: str, right: str) -> None:
@@ -548,7 +556,84 @@ def test_unknown_arguments_are_told_with_what_would_be_right(command: list[str])
     assert unknown_arguments(FILE, iter(['port', 'map_file']), given) == [
         'mapfile: there is no such argument; did you mean map_file?',
         'a: there is no such argument; --show-args lists them']
-    assert not unknown_arguments(FILE, [], ['ros2', 'launch', 'cell', 'cell.launch.py', 'x:=1'])
+
+
+INCLUDED = ['ros2', 'launch', 'cell', 'cell.launch.py', 'x:=1']
+BRIDGE = ['name', 'log_level', 'respawn', *parameter_types()]
+ELSEWHERE = 'If it is meant for another launch file, include this one in a group, with'
+
+
+@pytest.mark.parametrize(('name', 'value', 'meant'), [
+    ('readonly', 'true', 'read_only'), ('READ_ONLY', 'True', 'read_only'),
+    ('readOnly', '1', 'read_only'), ('read_only_mode', 'yes', 'read_only'),
+    ('bridge_read_only', 'on', 'read_only'), ('reda_only', 'ture', 'read_only'),
+    ('stand_by', 'true', 'standby'), ('standby_mode', 'true', 'standby')])
+def test_protection_that_is_misspelt_in_an_include_ends_the_launch(
+        name: str, value: str, meant: str) -> None:
+    given = dict.fromkeys(BRIDGE, '') | {name: value}
+    refused = f'{name} = "{value}": there is no such argument; did you mean {meant}? '
+    assert included(given) == ([f'{refused}{ELSEWHERE} {meant} "false"'], [])
+    assert included(given | {name: 'false'}) == ([], [warned(name, 'false', meant)])
+    assert included(given | {meant: 'false'}) == ([], [warned(name, value, meant)])
+    assert included(given | {meant: value}) == ([], [])
+
+
+@pytest.mark.parametrize(('name', 'value', 'meant'), [
+    ('mapfile', 'm.csv', 'map_file'), ('Map_File', 'm.csv', 'map_file'),
+    ('loglevel', 'debug', 'log_level'), ('write_timout', '1', 'write_timeout')])
+def test_other_misspelt_argument_of_an_include_is_warned_of(
+        name: str, value: str, meant: str) -> None:
+    given = dict.fromkeys(BRIDGE, '') | {name: value}
+    assert included(given) == ([], [warned(name, value, meant)])
+    assert included(given | {meant: value}) == ([], [])  # the including file passes it on
+
+
+@pytest.mark.parametrize('others', [
+    {'x': '1', 'robot': 'r', 'use_namespace': 'true', 'use_respawn': 'True', 'node_name': 'a',
+     'map_yaml_file': 'm', 'serial_port': 'p', 'ros_namespace': '/hall', 'lines_file': 'l'},
+    {'global_params': [('read_only', True)]}])
+def test_arguments_of_including_launch_files_are_none_of_our_business(
+        others: dict[str, Any]) -> None:
+    assert included(dict.fromkeys(BRIDGE, '') | others) == ([], [])
+
+
+def test_protection_that_a_launch_file_does_not_pass_on_ends_the_launch() -> None:
+    def lines(**given: str) -> tuple[list[str], list[str]]:
+        return misspelt(['lines_file', 'one_process'], given)
+
+    refused = ('read_only = "true": there is no such argument; write read_only into the parameter '
+               f'file. {ELSEWHERE} read_only "false"')
+    assert lines(read_only='true', lines_file='l') == ([refused], [])
+    assert lines(read_only='false', port='/dev/lidar') == ([], [])
+    assert lines(lines_fiel='l') == ([], [warned('lines_fiel', 'l', 'lines_file')])
+
+
+def included(given: dict[str, Any]) -> tuple[list[str], list[str]]:
+    assert not unknown_arguments(FILE, BRIDGE, INCLUDED)
+    return misspelt(BRIDGE, given)
+
+
+def warned(name: str, value: str, meant: str) -> str:
+    return (f'{name} = "{value}": there is no such argument, so it has no effect; did you mean '
+            f'{meant}?')
+
+
+@pytest.mark.parametrize(('name', 'text', 'expected'), [
+    ('read_only', 'maybe', "read_only = 'maybe' should be true or false"),
+    ('read_only', '"true"', "read_only = 'true' is a text and should be true or false: write it "
+                            'without quotes, in Python True'),
+    ('trace_file', 'off', 'trace_file = False should be text: YAML makes true or false of words '
+     'such as on and no; leave trace_file out, or write ./ before the name of a file'),
+    ('net_file', '123', 'net_file = 123 should be text: YAML makes a number of it; leave net_file '
+     'out, or write ./ before the name of a file'),
+    ('stale_after', '0', 'stale_after = 0.0 should be a number from 1 to 1000'),
+    ('port', '99', None), ('poll_list', '3', None), ('net_file', '2026-11-28', None),
+    ('read_only', 'True', None), ('stale_after', '7', None), ('map_file', '[a', None),
+    ('name', 'off', None), ('read_only', '', None)])
+def test_value_of_a_launch_argument_is_judged_as_the_node_does(
+        name: str, text: str, expected: str | None) -> None:
+    given = dict.fromkeys(BRIDGE, '') | {name: text}
+    assert unusable(given) == ([] if expected is None else [expected])
 
 
 def test_restart_has_the_scope_of_the_first_start() -> None:

@@ -358,7 +358,8 @@ def _nearest(name: str, known: Collection[str], begins: str, likeness: float) ->
     if name.startswith('map.'):
         return 'map.* only shows the map file: change the file'
     in_net = f'net.{name.lower()}'
-    close = [in_net] if in_net in known else difflib.get_close_matches(name, known, 1, likeness)
+    close = [in_net] if in_net in known else difflib.get_close_matches(
+        name.lower(), known, 1, likeness)
     if close:
         return f'did you mean {close[0]}?'
     if name.startswith(begins):
