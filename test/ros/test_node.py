@@ -515,6 +515,15 @@ def test_each_faulty_parameter_is_told_in_one_line(refusal: Callable[..., list[s
             'to 60', '/nowhere/net.csv: cannot be read: No such file or directory')]
 
 
+def test_two_topics_that_remaps_give_one_name_are_told_at_the_start(
+        refusal: Callable[..., list[str]]) -> None:
+    line, = refusal(*ros.ros_args(*ros.EXAMPLE_FILES), '-r', '~/read/door_closed:=/cell/bits',
+                    '-r', '/abdf1/read/cell_interlocks:=/cell/bits')
+    assert re.sub(r' \[[0-9.]+\]', '', line) == (
+        '[FATAL] [abdf1]: remaps: ~/read/cell_interlocks, ~/read/door_closed have one name, '
+        '/cell/bits; give each topic a name of its own')
+
+
 @pytest.mark.parametrize(('arguments', 'expected'), [
     (['--ros-args', '-r', '__node:=a-b'], 'a node name has letters, digits and underscores; '
      "Failed to parse ROS arguments: Couldn't parse remap rule: '-r __node:=a-b'."),

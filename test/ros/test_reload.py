@@ -172,6 +172,19 @@ def test_faulty_files_change_nothing(bench: Bench, capfd: Output) -> None:
     assert bench.reload()[0]  # the old faults are forgotten
 
 
+def test_row_whose_topic_has_another_topics_name_changes_nothing(
+        bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    session, resolve = bench.node.session, bench.node.resolve_topic_name
+    remaps = {'~/write/level': '/abdf1/read/speed'}
+    monkeypatch.setattr(
+        bench.node, 'resolve_topic_name', lambda name: remaps.get(name) or resolve(name))
+    bench.write_map(SPEED, RECIPE, LEVEL)
+    assert bench.reload() == (False, (
+        'goes on as before: remaps: ~/read/speed, ~/write/level have one name, /abdf1/read/speed; '
+        'give each topic a name of its own'))
+    assert bench.node.session is session
+
+
 def test_files_that_would_stop_the_line_change_nothing(bench: Bench) -> None:
     session = bench.node.session
     bench.write_map()

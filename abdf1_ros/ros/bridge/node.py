@@ -51,6 +51,7 @@ from abdf1_ros.ros.parameters.declared import (
 )
 from abdf1_ros.ros.parameters.shown import ShownFiles
 from abdf1_ros.ros.topics.messages import latched_qos, results_qos
+from abdf1_ros.ros.topics.names import TopicNames
 from abdf1_ros.ros.topics.writes import WriteTopics
 from abdf1_ros.settings.heartbeats import HAND_OVER, LONGEST_END
 from abdf1_ros.settings.network import Network
@@ -91,6 +92,7 @@ class BridgeNode(AnsweringNode):
             (port_owners or PortOwners()).hold, self.get_fully_qualified_name())
         try:
             configuration = configure(self, arguments)
+            TopicNames.of(self.resolve_topic_name, configuration.mappings)
             self._shown = ShownFiles(self)
             self._shown.show(configuration.network, configuration.shown_rows())
             self._hold_ports(*configuration.held)
@@ -196,6 +198,7 @@ class BridgeNode(AnsweringNode):
         before = self.session.configuration
         try:
             configuration = read_again(before)
+            TopicNames.of(self.resolve_topic_name, configuration.mappings)
             self._hold_ports(*before.held, *configuration.held)
             refuse_harm(before, configuration, self.link.state.is_open,
                         _port_settings(configuration))
