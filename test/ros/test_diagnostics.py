@@ -48,7 +48,6 @@ from abdf1_ros.plan.bounds import Times
 from abdf1_ros.ports.link_thread import LinkThread, PortState, RELEASED
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.trace import PortOpener
-from abdf1_ros.ros.bridge.session import stations_of
 from abdf1_ros.ros.diagnostics.dds import LOST
 from abdf1_ros.ros.diagnostics.events import LineEvents
 from abdf1_ros.ros.diagnostics.line import LineView, takes_in_silence
@@ -90,7 +89,7 @@ class Bench:
         self.results: list[DiagnosticStatus] = []
         self.tables = 0  # how often the Active Node Table has changed
         self.events = LineEvents(
-            get_logger('line_a'), PORT, stations_of(mappings), scans=mode != 'Peer',
+            get_logger('line_a'), PORT, mappings.asked, scans=mode != 'Peer',
             seen=self.seen, read=lambda mapping, values: None, results=self,
             table_changed=self._count, clock=lambda: self.now)
         self.driver = Driver(Network(mode=mode), mappings, DriverSettings(), self.events)
@@ -1019,7 +1018,7 @@ def test_gateway_of_a_station_is_named(make_bench: Benches) -> None:
     assert bench.details('station 1')['last event'].startswith('2520 NTC_ENQ_LIMIT_EXCEEDED')
     assert bench.details('station 1')['gateway'] == '0'
     assert 'gateway' not in bench.details('station 2')
-    assert stations_of(bench.driver.mappings) == {0, 1, 2}
+    assert bench.driver.mappings.asked == {0, 1, 2}
     said = []
     for number in (1, 0):
         bench.driver.stations.lost(number, NOW)
