@@ -23,7 +23,7 @@ from importlib import import_module
 from abdf1_ros.ports import listening
 from abdf1_ros.ports.descriptor import Port
 from abdf1_ros.ports.serial_device import open_device
-from abdf1_ros.ports.settings import PortSettings
+from abdf1_ros.ports.settings import Lack, PortSettings
 
 
 def name_port(error: OSError, name: str) -> None:
@@ -33,12 +33,12 @@ def name_port(error: OSError, name: str) -> None:
     error.filename = error.filename or name
 
 
-def open_port(settings: PortSettings, tell: Callable[[str], None] = lambda text: None) -> Port:
+def open_port(settings: PortSettings, tell: Callable[[Lack], None] = lambda lack: None) -> Port:
     """
     Open a port; a serial device is opened exclusively.
 
-    A URL is opened by the module of its scheme, if there is one. ``tell`` is called with
-    settings that the port does not support, which is not an error. Raises OSError.
+    A URL is opened by the module of its scheme, if there is one. ``tell`` is called with options
+    that the port does not have, which is not an error. Raises OSError.
     """
     if settings.listens:
         return listening.open_port(settings)
@@ -53,4 +53,7 @@ def open_port(settings: PortSettings, tell: Callable[[str], None] = lambda text:
             raise
         return open_device(settings, tell)
     port: Port = opener.open_port(settings)
+    if settings.rs485:
+        tell(Lack('rs485', 'rs485 has no effect: only the device server can switch its '
+                  'transmitter'))
     return port

@@ -20,6 +20,7 @@ The properties of adapters are in docs/connect.md.
 
 from __future__ import annotations
 
+from array import array
 from collections import deque
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
@@ -35,9 +36,9 @@ from abdf1_ros.df1.frames import Damaged
 from abdf1_ros.line_names import device_of, number_of
 from abdf1_ros.ports.descriptor import DescriptorPort, NO_DATA_TAKEN, WRITE_TIMEOUT
 from abdf1_ros.ports.ownership import BUSY, own
-from abdf1_ros.ports.settings import PortSettings
+from abdf1_ros.ports.settings import Lack, PortSettings
 import serial
-import serial.rs485
+from serial.serialutil import SerialException  # another package named serial lacks it
 
 # Our own texts for errors whose system text says too little.
 NOT_SERIAL = 'this is not a serial port'
@@ -49,6 +50,10 @@ _PARITIES = {'None': serial.PARITY_NONE, 'Even': serial.PARITY_EVEN, 'Odd': seri
 _TIOCGICOUNT = 0x545D
 _ICOUNTER = struct.Struct('20i')
 _FRAME, _OVERRUN, _PARITY, _BUFFER_OVERRUN = 6, 7, 8, 10
+
+# struct serial_rs485 of Linux, <linux/serial.h>: eight words, of which the first has flags.
+_TIOCGRS485, _TIOCSRS485, _RS485_WORDS = 0x542E, 0x542F, 8
+_ENABLED, _RTS_ON_SEND, _RTS_AFTER_SEND = 1, 2, 4
 
 _PSEUDO_TERMINALS = '/dev/pts/'
 
@@ -70,11 +75,11 @@ def is_pseudo_terminal(name: str) -> bool:
     return os.path.realpath(name).startswith(_PSEUDO_TERMINALS)
 
 
-def open_device(settings: PortSettings, tell: Callable[[str], None]) -> SerialDevice:
+def open_device(settings: PortSettings, tell: Callable[[Lack], None]) -> SerialDevice:
     """
     Open a device exclusively.
 
-    ``tell`` is called with settings that the port does not support, which is not an error. Raises
+    ``tell`` is called with options that the port does not have, which is not an error. Raises
     OSError.
     """
     def opened(stack: ExitStack) -> int:
@@ -123,23 +128,51 @@ def _opened(settings: PortSettings) -> serial.Serial:
 
 def _plain(error: Exception) -> tuple[object, ...]:
     """Return the text of the operating system, without the words that pyserial adds."""
-    said = error.__context__ if isinstance(error, serial.SerialException) else error
+    said = error.__context__ if isinstance(error, SerialException) else error
     args = said.args if isinstance(said, OSError | termios.error) else error.args
     return (args[0], _REASONS.get(args[0], args[1])) if len(args) > 1 else args
 
 
-def _set_options(port: serial.Serial, settings: PortSettings, tell: Callable[[str], None]) -> None:
+def _set_options(port: serial.Serial, settings: PortSettings,
+                 tell: Callable[[Lack], None]) -> None:
     """Set the options of a device, apart from speed and character format."""
     if settings.low_latency:
         try:
             port.set_low_latency_mode(True)
         except (AttributeError, ValueError, OSError) as error:
-            tell(f'the port has no low-latency mode: {error}')
+            tell(Lack('low_latency', f'the port has no low-latency mode: {error}'))
     if settings.rs485:
         try:
-            port.rs485_mode = serial.rs485.RS485Settings()
-        except (ValueError, OSError) as error:
-            tell(f'the port has no RS-485 mode: {error}')
+            if text := _switch_transmitter(port.fileno()):
+                tell(Lack('rs485', text))
+        except OSError as error:
+            tell(Lack('rs485', 'rs485 has no effect: the port has no RS-485 mode: '
+                      f'{error.strerror}'))
+
+
+def _switch_transmitter(descriptor: int) -> str:
+    """
+    Let the system switch an RS-485 transmitter with RTS; return what the driver does instead.
+
+    The level of RTS stays as the device tree or another program has set it. If no level is set,
+    RTS is on while sending, as newer kernels choose themselves. Raises OSError.
+    """
+    state = array('I', [0] * _RS485_WORDS)
+    fcntl.ioctl(descriptor, _TIOCGRS485, state)
+    if state[0] & _ENABLED:
+        return ''
+    if not state[0] & (_RTS_ON_SEND | _RTS_AFTER_SEND):
+        state[0] |= _RTS_ON_SEND
+    state[0] |= _ENABLED
+    asked = state[0]
+    fcntl.ioctl(descriptor, _TIOCSRS485, state)
+    fcntl.ioctl(descriptor, _TIOCGRS485, state)
+    if not state[0] & _ENABLED:
+        return 'rs485 has no effect: the driver of the port accepts it and ignores it'
+    if (state[0] ^ asked) & (_RTS_ON_SEND | _RTS_AFTER_SEND):
+        return ('rs485: the driver of the port has changed the level of RTS; is the transmitter '
+                'off while it listens?')
+    return ''
 
 
 def mark_damage(descriptor: int) -> None:

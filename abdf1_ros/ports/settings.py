@@ -17,12 +17,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import NamedTuple, TYPE_CHECKING
 
 from abdf1_ros.df1.machine import character_time
 
 if TYPE_CHECKING:
     from abdf1_ros.settings.network import Network
+
+
+class Lack(NamedTuple):
+    """An option that was asked for and that a port does not have, with the reason."""
+
+    option: str
+    text: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,8 +38,8 @@ class PortSettings:
     How to open the port ``name``: a device path, ``socket://host:port`` or ``rfc2217://...``.
 
     These are the columns of the net CSV about the port. With ``low_latency`` a USB adapter passes
-    bytes on at once, instead of collecting them for up to 16 ms. ``rs485`` switches the
-    transmitter of an RS-485 port on and off with RTS. A port that does not support one of these
+    bytes on at once, instead of collecting them for up to 16 ms. ``rs485`` lets the system switch
+    the transmitter of an RS-485 port with RTS. A port that does not support one of these
     options is opened without it. With ``listens`` the port is opened for reading only. ``second``
     is the second port of a line that is heard on two ports.
     """

@@ -28,7 +28,7 @@ from abdf1_ros.df1.listen import SecondPort
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.ports.descriptor import Port, PortAround
 from abdf1_ros.ports.opening import open_port
-from abdf1_ros.ports.settings import PortSettings
+from abdf1_ros.ports.settings import Lack, PortSettings
 from abdf1_ros.sniffer.capture import CaptureWriter, Chunk, Direction, LOST, setting_line
 
 # Most chunks that wait for the disk: some minutes of a busy line.
@@ -139,15 +139,16 @@ class PortOpener:
     """
     Open a port, again after each loss.
 
-    ``tell`` is passed to ``open_port``. After ``trace``, a capture records all bytes of the port
-    from its next opening on. An error of the capture is given to ``on_error``, and has no effect
-    on the port.
+    ``tell`` is called with options that the port does not have, but not at each opening anew.
+    After ``trace``, a capture records all bytes of the port from its next opening on. An error of
+    the capture is given to ``on_error``, and has no effect on the port.
     """
 
     def __init__(self, settings: PortSettings,
-                 tell: Callable[[str], None] = lambda text: None) -> None:
+                 tell: Callable[[Lack], None] = lambda lack: None) -> None:
         self.settings = settings
         self._tell = tell
+        self._lacks: list[Lack] = []
         self._port: Port | None = None
         self._trace: Trace | None = None
         self._begun = 0.0
@@ -159,6 +160,8 @@ class PortOpener:
         ``head`` has the settings of the line, for a capture.
         """
         before, self.settings = self.settings, settings
+        if settings != before:
+            self._lacks = []
         if self._trace is not None:
             self._trace.write(self._head(head))
         return settings != before
@@ -187,7 +190,12 @@ class PortOpener:
 
     def open(self) -> Port:  # noqa: A003
         """Open the port; raises OSError."""
-        self._port = port = open_port(self.settings, self._tell)
+        lacks: list[Lack] = []
+        self._port = port = open_port(self.settings, lacks.append)
+        for lack in lacks:
+            if lack not in self._lacks:
+                self._tell(lack)
+        self._lacks = lacks
         if self._trace is None:
             return port
         first = Direction.IN if not self.settings.listens else \

@@ -169,8 +169,8 @@ def test_process_with_threads_of_rclpy_or_pyserial_ends_at_once() -> None:
 @pytest.mark.parametrize(('name', 'module', 'cure'), [
     ('node', 'rclpy', 'is ROS 2 sourced, as by ". /opt/ros/jazzy/setup.bash"?'),
     ('plc', 'serial', '"pip install pyserial", or "make setup" in a checkout'),
-    ('plc', 'serial.rs485', 'serial is of another package: "pip uninstall serial", then "pip '
-                            'install pyserial"')])
+    ('plc', 'serial.serialutil', 'serial is of another package: "pip uninstall serial", then "pip '
+                                 'install pyserial"')])
 def test_module_that_is_missing_is_named(
         tmp_path: Path, name: str, module: str, cure: str) -> None:
     text = f"raise ModuleNotFoundError('no', name='{module}')\n"

@@ -29,7 +29,7 @@ from abdf1_ros.ports import trial
 from abdf1_ros.ports.descriptor import DescriptorPort, Port
 from abdf1_ros.ports.opening import name_port, open_port
 from abdf1_ros.ports.ownership import line_of, own
-from abdf1_ros.ports.settings import PortSettings
+from abdf1_ros.ports.settings import Lack, PortSettings
 from abdf1_ros.ports.trial import why_not
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings import network
@@ -57,6 +57,15 @@ def test_scheme_is_a_file_and_a_word(made_up: list[PortSettings]) -> None:
     open_port(PortSettings.of(network.make_network(
         {name: (cell, 'test') for name, cell in cells.items()}))).close()
     assert made_up == [PortSettings('pigeon://loft:7', 19200, 7, 'Even', 2, handshake=True)]
+
+
+@pytest.mark.parametrize('rs485', [True, False])
+def test_transmitter_of_a_device_server_is_not_switched_from_here(
+        made_up: list[PortSettings], rs485: bool) -> None:
+    told: list[Lack] = []
+    open_port(PortSettings('pigeon://loft:7', rs485=rs485), told.append).close()
+    assert told == [Lack('rs485', 'rs485 has no effect: only the device server can switch its '
+                                  'transmitter')] * rs485
 
 
 @pytest.mark.parametrize('name', ['loop://', 'pigeon://loft:7'])  # pyserial knows the first

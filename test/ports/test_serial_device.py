@@ -14,6 +14,7 @@
 
 """Serial devices: how they are listed and opened, damaged characters, counts, and the end."""
 
+from array import array
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
 import errno
@@ -33,7 +34,7 @@ from abdf1_ros.ports import listing, serial_device
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.ownership import own
 from abdf1_ros.ports.serial_device import hold_device, mark_damage, SerialDevice
-from abdf1_ros.ports.settings import PortSettings
+from abdf1_ros.ports.settings import Lack, PortSettings
 import pytest
 import serial
 from support.cases import for_all
@@ -68,28 +69,79 @@ def test_setting_that_the_device_does_not_have(pty: Pty) -> None:
         open_port(PortSettings(str(pty.name), parity='Even'))
 
 
-def told_by_open(settings: PortSettings) -> list[str]:
-    """Return what ``open_port`` tells of the options."""
-    told: list[str] = []
+def told_by_open(settings: PortSettings) -> dict[str, str]:
+    """Return the options that ``open_port`` tells of, each with its text."""
+    told: list[Lack] = []
     open_port(settings, told.append).close()
-    return told
+    return dict(told)
 
 
 def test_option_that_a_port_does_not_have_is_told_and_no_error(pty: Pty) -> None:
-    low_latency, rs485 = told_by_open(PortSettings(str(pty.name), rs485=True))
-    assert low_latency.startswith('the port has no low-latency mode: ')
-    assert rs485.startswith('the port has no RS-485 mode: ')
-    assert told_by_open(PortSettings(str(pty.name), low_latency=False)) == []
+    told = told_by_open(PortSettings(str(pty.name), rs485=True))
+    assert told.pop('low_latency').startswith('the port has no low-latency mode: ')
+    assert told == {'rs485': 'rs485 has no effect: the port has no RS-485 mode: Inappropriate '
+                             'ioctl for device'}
+    assert told_by_open(PortSettings(str(pty.name), low_latency=False)) == {}
 
 
-def test_option_that_a_port_has_is_set(pty: Pty, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_low_latency_that_a_port_has_is_set(pty: Pty, monkeypatch: pytest.MonkeyPatch) -> None:
     asked = []
     monkeypatch.setattr(serial.Serial, 'set_low_latency_mode',
                         lambda port, mode: asked.append(mode))
-    monkeypatch.setattr(serial.Serial, 'rs485_mode', property(
-        fset=lambda port, settings: asked.append(settings.rts_level_for_tx)))
-    assert told_by_open(PortSettings(str(pty.name), rs485=True)) == []
-    assert asked == [True, True]
+    assert told_by_open(PortSettings(str(pty.name))) == {}
+    assert asked == [True]
+
+
+class Kernel:
+    """
+    The RS-485 state of a port in a kernel, as linux/serial.h has it: flags, two delays, padding.
+
+    ``takes`` is what the driver of the port makes of the flags that it is asked for.
+    """
+
+    _ioctl = staticmethod(fcntl.ioctl)
+
+    def __init__(self, flags: int, takes: Callable[[int], int] = lambda flags: flags) -> None:
+        self.state = [flags, 7, 9, 0, 0, 0, 0, 0]
+        self.asked: list[int] = []
+        self._takes = takes
+
+    def ioctl(self, descriptor: int, request: int, *arguments: Any) -> Any:
+        if request == 0x542E:  # TIOCGRS485
+            arguments[0][:] = array(arguments[0].typecode, self.state)
+        elif request == 0x542F:  # TIOCSRS485
+            self.asked.append(arguments[0][0])
+            self.state = [self._takes(arguments[0][0]), *arguments[0][1:]]
+        else:
+            return self._ioctl(descriptor, request, *arguments)
+        return 0
+
+
+# Flags: enabled 1, RTS on while sending 2, RTS on after sending 4, receive while sending 16.
+@pytest.mark.parametrize(('flags', 'asked'), [
+    (0, [1 | 2]), (2, [1 | 2]), (4, [1 | 4]), (4 | 16, [1 | 4 | 16]),
+    (1 | 2, []), (1 | 4, []), (1 | 2 | 16, [])])
+def test_rs485_keeps_the_polarity_that_stands(
+        pty: Pty, monkeypatch: pytest.MonkeyPatch, flags: int, asked: list[int]) -> None:
+    kernel = Kernel(flags)
+    monkeypatch.setattr(fcntl, 'ioctl', kernel.ioctl)
+    name = str(pty.name)
+    assert told_by_open(PortSettings(name, low_latency=False)) == {}
+    assert kernel.state == [flags, 7, 9, 0, 0, 0, 0, 0]
+    assert told_by_open(PortSettings(name, low_latency=False, rs485=True)) == {}
+    assert (kernel.asked, kernel.state) == (asked, [*(asked or [flags]), 7, 9, 0, 0, 0, 0, 0])
+
+
+@pytest.mark.parametrize(('takes', 'text'), [
+    (lambda flags: 4, 'rs485 has no effect: the driver of the port accepts it and ignores it'),
+    (lambda flags: 1 | 2, 'rs485: the driver of the port has changed the level of RTS; is the '
+                          'transmitter off while it listens?')])
+def test_rs485_that_a_driver_does_not_carry_out_is_told(
+        pty: Pty, monkeypatch: pytest.MonkeyPatch, takes: Callable[[int], int],
+        text: str) -> None:
+    monkeypatch.setattr(fcntl, 'ioctl', Kernel(4, takes).ioctl)
+    assert told_by_open(PortSettings(str(pty.name), low_latency=False, rs485=True)) == {
+        'rs485': text}
 
 
 @pytest.mark.parametrize(('listens', 'parity', 'flags'), [

@@ -14,6 +14,8 @@
 
 """What passes a port is recorded, and nothing else changes."""
 
+from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 import threading
 from types import SimpleNamespace
@@ -21,7 +23,7 @@ from unittest.mock import Mock
 
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.ports import trace as trace_module
-from abdf1_ros.ports.settings import PortSettings
+from abdf1_ros.ports.settings import Lack, PortSettings
 from abdf1_ros.ports.trace import PortOpener, Trace, TracedPort
 from abdf1_ros.sniffer.capture import CaptureWriter, Chunk, Direction, read_capture
 import pytest
@@ -170,6 +172,17 @@ def test_opener_records_across_openings(tmp_path: Path, monkeypatch: pytest.Monk
         '19200', 'CRC', 'full', str(pty.name))
     assert settings['begun'][:2] == '20'
     pty.close()
+
+
+def test_opener_tells_once_what_a_port_lacks(tmp_path: Path) -> None:
+    told: list[Lack] = []
+    with closing(Pty(tmp_path / 'a')) as first, closing(Pty(tmp_path / 'b')) as second:
+        settings = PortSettings(str(first.name), low_latency=False, rs485=True)
+        opener = PortOpener(settings, told.append)
+        for pty, count in ((first, 1), (first, 1), (second, 2)):
+            opener.use(replace(settings, name=str(pty.name)), {})
+            opener.open().close()
+            assert [lack.option for lack in told] == ['rs485'] * count
 
 
 def test_opener_that_cannot_record_opens_all_the_same(tmp_path: Path) -> None:

@@ -19,6 +19,7 @@ from dataclasses import replace
 from functools import partial
 import os
 from pathlib import Path
+import re
 import threading
 from typing import Any
 
@@ -363,6 +364,8 @@ def test_other_speed_opens_the_port_anew(bench: Bench, capfd: Output) -> None:
     assert ros.values_in(speeds.first()) == [7, 8]
     settings = bench.node.surroundings.opener.settings
     assert (settings.baud, settings.rs485, settings.low_latency) == (19200, True, False)
+    assert re.search(rf'\[WARN\] .*: {bench.plcs.port}: rs485 has no effect: the port has no '
+                     'RS-485 mode: ', capfd.readouterr().err)
 
 
 def test_file_that_has_changed_is_told_once(bench: Bench, capfd: Output) -> None:

@@ -29,7 +29,7 @@ from abdf1_ros.driver.driver import ENDS
 from abdf1_ros.driver.writes.queue import MAX_WAITING_WRITES
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.link_thread import LinkThread, PortState
-from abdf1_ros.ports.settings import PortSettings
+from abdf1_ros.ports.settings import Lack, PortSettings
 from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.ros.bridge.last_writes import LAST_WRITES, take_last_writes
@@ -106,9 +106,7 @@ class BridgeNode(AnsweringNode):
         super().destroy_node()
 
     def _set_up(self, configuration: Configuration, graph: Graph) -> None:
-        self._opener = PortOpener(
-            _port_settings(configuration),
-            lambda text: self.get_logger().debug(f'{printable(self.session.port)}: {text}'))
+        self._opener = PortOpener(_port_settings(configuration), self._port_lacks)
         self.writes = WriteTopics(self)
         names = graph.name_watch(self, is_spare=configuration.parameters.standby)
         self.surroundings = Surroundings(
@@ -186,6 +184,14 @@ class BridgeNode(AnsweringNode):
 
     def _port_changed(self, state: PortState) -> None:
         self.session.port_changed(state)
+
+    def _port_lacks(self, lack: Lack) -> None:
+        """Log an option that the port does not have; rs485 has to be asked for."""
+        text = f'{printable(self.session.port)}: {lack.text}'
+        if lack.option == 'rs485':
+            self.get_logger().warning(text)
+        else:
+            self.get_logger().debug(text)
 
     def _fault(self, error: Exception) -> None:
         self.get_logger().error(f'internal error: {bug_text(error)}')
