@@ -23,8 +23,8 @@ import difflib
 from pathlib import Path
 from typing import Any
 
-from abdf1_ros.ros.parameters.declared import Parameters
-from abdf1_ros.ros.parameters.values import read_yaml, usable
+from abdf1_ros.ros.parameters.declared import checked, Parameters
+from abdf1_ros.ros.parameters.values import read_yaml
 from abdf1_ros.text import printable
 
 # A bridge without them writes, or answers beside its spare.
@@ -105,15 +105,15 @@ def _is_asked_for(text: str) -> bool:
 
 def unusable(given: Mapping[str, str]) -> list[str]:
     """Return faults of the values of the node's own parameters, each with its name."""
-    usual, problems = Parameters(), []
+    kinds, problems = parameter_types(), list[str]()
     for entry in fields(Parameters):
         if not (text := given[entry.name]):
             continue
-        value, default = read_yaml(text), getattr(usual, entry.name)
-        if isinstance(default, str) and not isinstance(value, int | float):
+        value = read_yaml(text)
+        if kinds[entry.name] is str and not isinstance(value, int | float):
             value = text  # as launch passes it on
         try:
-            usable(entry.name, value, default, entry.metadata['low'], entry.metadata['high'])
+            checked(entry, value)
         except ValueError as error:
             problems.append(printable(str(error)))
     return problems

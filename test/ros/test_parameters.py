@@ -629,7 +629,9 @@ def warned(name: str, value: str, meant: str) -> str:
     ('stale_after', '0', 'stale_after = 0.0 should be a number from 1 to 1000'),
     ('port', '99', None), ('poll_list', '3', None), ('net_file', '2026-11-28', None),
     ('read_only', 'True', None), ('stale_after', '7', None), ('map_file', '[a', None),
-    ('name', 'off', None), ('read_only', '', None)])
+    ('name', 'off', None), ('read_only', '', None), ('nak_on_command_timeout', 'false', None),
+    ('nak_on_command_timeout', 'maybe',
+     "nak_on_command_timeout = 'maybe' should be one of auto, true, false")])
 def test_value_of_a_launch_argument_is_judged_as_the_node_does(
         name: str, text: str, expected: str | None) -> None:
     given = dict.fromkeys(BRIDGE, '') | {name: text}

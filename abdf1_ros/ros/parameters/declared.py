@@ -18,11 +18,11 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from collections.abc import Mapping as MappingType
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, Field, field, fields, replace
 import difflib
 import os
 import random
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from abdf1_ros.df1.polling import STANDARD
 from abdf1_ros.df1.settings import PollingSettings
@@ -418,6 +418,12 @@ def _declare(node: Node, given: Given, name: str, default: object,
         return node.declare_parameter(name, default, descriptor).value
 
 
+def checked(entry: Field[Any], value: object) -> Any:
+    """Return the value of a field of Parameters; raises ValueError if it cannot be used."""
+    return usable(entry.name, value, getattr(Parameters(), entry.name), **{
+        limit: entry.metadata[limit] for limit in ('low', 'high', 'choices')})
+
+
 def _declare_own(node: Node, given: Given, problems: list[Problem]) -> Parameters:
     usual, values = Parameters(), Checked()
     for entry in fields(Parameters):
@@ -426,8 +432,7 @@ def _declare_own(node: Node, given: Given, problems: list[Problem]) -> Parameter
         value = _declare(node, given, entry.name, default, descriptor_of(
             default, entry.metadata['description'], low, high, read_only=True))
         try:
-            values[entry.name] = usable(
-                entry.name, value, default, low, high, entry.metadata['choices'])
+            values[entry.name] = checked(entry, value)
         except ValueError as error:
             problems.append(Problem(f'parameter {entry.name}', str(error)))
             values[entry.name] = default
