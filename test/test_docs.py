@@ -115,7 +115,7 @@ LOOKED_UP = ('docs/reference/', 'docs/protocol/', 'docs/heartbeats.md', 'docs/te
 
 
 def test_pages_that_are_read_through_are_short() -> None:
-    sizes = {name: len(documents.without_code(documents.text(name)).split())
+    sizes = {name: len(documents.prose(documents.text(name)).split())
              for name in documents.NAMES if not name.startswith(LOOKED_UP)}
     assert {name: size for name, size in sizes.items() if size > 1200} == {}
 

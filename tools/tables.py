@@ -24,16 +24,19 @@ from typing import Any
 
 from abdf1_ros.counters import numbered
 from abdf1_ros.df1.frames import Code
+from abdf1_ros.driver.guest_rules import right_for
 from abdf1_ros.messages import Message, Severity
 from abdf1_ros.numbers import ValueKind
 from abdf1_ros.pccc.access import Access
-from abdf1_ros.pccc.describe import command_codes
+from abdf1_ros.pccc.describe import command_codes, known_commands
 from abdf1_ros.pccc.dialect import Dialect
 from abdf1_ros.pccc.families import dialect_of, FAMILIES, parse_address
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.members import Members
+from abdf1_ros.pccc.notation import Effect
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.status import Meanings, status_text, USUAL_MEANINGS
+from abdf1_ros.pccc.targets import Target
 from abdf1_ros.pccc.values import types_of
 from abdf1_ros.plan.report import make_report
 from abdf1_ros.settings.columns import MAP_COLUMNS
@@ -289,3 +292,26 @@ def rooms() -> str:
         (', '.join(map(_code, room.name.split(', '))), room.contents,
          'everything' if room.allowed is None else ', '.join(map(_code, room.allowed))
          or 'nothing of the package') for room in ROOMS))
+
+
+def rights() -> str:
+    """Return the right that each command of a guest needs, for each target that it can have."""
+    groups: dict[tuple[str, Effect, tuple[Target, ...]], list[str]] = {}
+    for (cmd, function), command in known_commands().items():
+        code = f'`{cmd:02X}`' if function is None else f'`{cmd:02X}/{function:02X}`'
+        reach = command.reach
+        groups.setdefault((reach.form, command.effect, reach.kinds), []).append(code)
+    rows = []
+    for (form, effect, kinds), codes in sorted(
+            groups.items(), key=lambda group: (not group[0][0], group[0][0])):
+        for kind in kinds:
+            right, name = right_for(effect, kind), kind.value
+            if Target.CLOCK not in kinds or right is right_for(
+                    effect, Target.STATUS) is right_for(effect, Target.CLOCK):
+                if kind is Target.CLOCK:
+                    continue  # no difference from the other words
+                name = name.removeprefix('other ')
+            rows.append((form or 'any', ', '.join(codes), name, f'`{right.value}`'))
+    rows += [('any', 'any other, and one that is malformed', Target.OTHER.value, '`All`'),
+             ('any', 'any to all stations (DST 255)', 'all that hear it', '`All`')]
+    return table(('PLC', 'command', 'it addresses', '`Share_Access`'), rows)

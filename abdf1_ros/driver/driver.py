@@ -54,7 +54,7 @@ from abdf1_ros.df1.stations import ActiveStationList, Station
 from abdf1_ros.df1.tasks import Task
 from abdf1_ros.driver.agenda import Agenda, QUESTION_PERIOD
 from abdf1_ros.driver.checks import Checks
-from abdf1_ros.driver.foreign_words import written_extents
+from abdf1_ros.driver.guest_rules import GuestRules
 from abdf1_ros.driver.guests import GuestQueue
 from abdf1_ros.driver.inbox import Inbox
 from abdf1_ros.driver.interlocks.queue import Interlocks
@@ -72,10 +72,11 @@ from abdf1_ros.driver.writes.standing import Standing
 from abdf1_ros.driver.writes.under_way import WritesUnderWay
 from abdf1_ros.errors import FormatError, INTERNAL_ERROR, PortLost
 from abdf1_ros.messages import Event
-from abdf1_ros.pccc.extent import Extent, OUR_TABLE
+from abdf1_ros.pccc.extent import OUR_TABLE
 from abdf1_ros.pccc.families import served_counters
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity
+from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.resets import lost_by_reset
@@ -169,9 +170,9 @@ class Driver:
         self.interlocks = Interlocks(
             Rows() if settings.read_only else self.mappings, self._writes, writing, self.served,
             self._listener, self._foreign_value, settings.first_tns)
-        self.guests = GuestQueue(self.stations, machine, network.cmd_timeout / 1000,
-                                 self._station_of_guest, self._words_of_guest, record,
-                                 self._fell_silent)
+        self.guests = GuestQueue(
+            self.stations, machine, network.cmd_timeout / 1000,
+            GuestRules(network, self.mappings, self._processor_of), record, self._fell_silent)
         compares = (self.interlocks,) if self.interlocks.heartbeats else ()
         repeated = [row for row in self.mappings if row.write_again]
         self._standing = Standing(repeated, settings.write_timeout)
@@ -311,21 +312,10 @@ class Driver:
         if not any(station.active for station in self.stations):
             self._connect()
 
-    def _station_of_guest(self, dst: int) -> int:
-        """
-        Return the station that a guest means.
-
-        In Mode Peer with rows of one station this is the one PLC, whatever the DST. Only the map
-        decides this: a guest's writes must not go elsewhere after a gateway has reported a fault.
-        """
-        stations = [station.number for station in self.stations]
-        is_only = self.network.line_mode.has_one_plc and len(stations) == 1
-        return stations[0] if is_only else dst
-
-    def _words_of_guest(self, command: Packet, station: int) -> list[Extent] | None:
-        # A PLC-5 has separate words for each station number that sends it PLC-2 writes. On the
-        # line this number is ours.
-        return written_extents(command._replace(src=self.network.station), station, self.mappings)
+    def _processor_of(self, station: int) -> Processor | None:
+        """Return the processor that a station reports, None if unknown."""
+        identity = self.checks.known(station).identity
+        return None if identity is None else identity.processor
 
     def _sort_inbox(self, now: float) -> None:
         """Store messages of Serve rows in our table; let all others wait for the line."""

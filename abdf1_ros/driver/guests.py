@@ -29,12 +29,12 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Container
 from dataclasses import dataclass, field
-from enum import Enum
 import math
 
 from abdf1_ros.df1.packet import BROADCAST, is_local_status, Packet
 from abdf1_ros.df1.probes import Asker
 from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.driver.guest_rules import GuestRules, ShareAccess
 from abdf1_ros.driver.inbox import Inbox
 from abdf1_ros.driver.job_tasks import Job, LineTime
 from abdf1_ros.driver.record import Claim, WriteRecord
@@ -43,7 +43,6 @@ from abdf1_ros.driver.write import Outcome
 from abdf1_ros.errors import CommandExpired, PortLost, StationInactive
 from abdf1_ros.pccc.describe import effect_of
 from abdf1_ros.pccc.dialect import Steps
-from abdf1_ros.pccc.extent import Extent
 from abdf1_ros.pccc.notation import Effect
 
 _MOST_WAITING = 16  # commands of a guest; AbDf1 sends this many before it waits for a reply
@@ -52,31 +51,20 @@ _NO_BUFFER, _NOT_ACKNOWLEDGED, _NOT_CONNECTED, _NO_REPLY, _OFF_LINE = 0x01, 0x02
 _NOT_ALLOWED = 0x60
 
 
-class ShareAccess(Enum):
-    """The rights of guests (column Share_Access)."""
-
-    READ = 'Read'
-    WRITE = 'Write'
-    ALL = 'All'
-
-    def allows(self, command: Packet) -> bool:
-        """Tell whether a command may be sent."""
-        effect = effect_of(command)
-        return self is ShareAccess.ALL or effect is Effect.READS or (
-            self is ShareAccess.WRITE and effect is Effect.WRITES)
-
-
 class GuestListener:
     """A listener to guests, in any thread; methods that are not overridden do nothing."""
 
     def sends(self, guest: Guest, command: Packet) -> None:
         """Take a command that is sent now, with our SRC and TNS."""
 
-    def wrote(self, guest: Guest, command: Packet, station: int, words: list[Extent]) -> None:
-        """Take a command that may have changed a PLC: it is not a read."""
+    def wrote(self, guest: Guest, command: Packet, claim: Claim) -> None:
+        """Take a command that may have changed words of a PLC, and which words."""
 
-    def was_refused(self, guest: Guest, command: Packet) -> None:
-        """Take a command that was not allowed."""
+    def goes_beyond(self, guest: Guest, command: Packet) -> None:
+        """Take a command that only All allows; it will be sent."""
+
+    def was_refused(self, guest: Guest, command: Packet, needed: ShareAccess) -> None:
+        """Take a command that was not allowed, and the right that it needs."""
 
     def was_unanswered(self, guest: Guest, command: Packet, sts: int) -> None:
         """Take a command that got an STS of ours in place of a reply of the PLC."""
@@ -91,6 +79,7 @@ class Guest:
     A guest and what it has done; ``name`` is its place.
 
     - ``refused``: number of commands that were not allowed.
+    - ``beyond``: number of commands, allowed or not, that only All allows.
     - ``unanswered``: number of commands without a reply of the PLC.
     - ``collisions``: number of writes to words that we write too.
     - ``slowest``: longest time (s) to a reply.
@@ -103,6 +92,7 @@ class Guest:
     is_connected: bool = False
     commands: int = 0
     refused: int = 0
+    beyond: int = 0
     unanswered: int = 0
     slowest: float = 0.0
     collisions: int = 0
@@ -141,7 +131,7 @@ class GuestJob(Job):
         packet = self.asked.packet
         reply = yield packet.cmd, packet.data
         self.sts = reply.sts
-        self._queue.answered(self.asked, reply)
+        self._queue.answered(self, reply)
 
     def ended(self, error: Exception | None) -> None:
         self._queue.ended(self, self._begun, error)
@@ -152,21 +142,17 @@ class GuestQueue:
     The commands of all guests, in turns.
 
     ``put`` may be called from any thread. A command that has waited ``patience`` s is not sent any
-    more. ``station_of`` returns the station for a DST, ``words`` the words that a command writes,
-    if known. Each command that may write is in the ``record``. ``fell_silent`` is called when a
-    station that only guests ask has become silent.
+    more. ``rules`` say what is allowed. Each command that may change words is in the ``record``.
+    ``fell_silent`` is called when a station that only guests ask has become silent.
     """
 
     def __init__(self, stations: ActiveStationList, line: LineTime, patience: float,
-                 station_of: Callable[[int], int],
-                 words: Callable[[Packet, int], list[Extent] | None],
-                 record: WriteRecord,
+                 rules: GuestRules, record: WriteRecord,
                  fell_silent: Callable[[], None] = lambda: None) -> None:
         self._stations = stations
         self.line = line
         self._patience = patience
-        self._station_of = station_of
-        self._words = words
+        self._rules = rules
         self._record = record
         self._fell_silent = fell_silent
         self._unanswered = UnansweredCommands()
@@ -178,11 +164,16 @@ class GuestQueue:
         """Take a command, or refuse it at once; then wake the link."""
         guest = command.guest
         guest.commands += 1
-        if not guest.access.allows(command.packet):
+        needed = self._rules.right_needed(command.packet)
+        guest.beyond += needed is ShareAccess.ALL
+        if not guest.access.includes(needed):
             guest.refused += 1
-            guest.listener.was_refused(guest, command.packet)
+            guest.listener.was_refused(guest, command.packet, needed)
             _refuse(command, _NOT_ALLOWED)
-        elif not self.inbox.put(command):
+            return
+        if needed is ShareAccess.ALL:
+            guest.listener.goes_beyond(guest, command.packet)
+        if not self.inbox.put(command):
             self._give_up(command, _NOT_CONNECTED)
 
     def begin(self) -> None:
@@ -209,7 +200,7 @@ class GuestQueue:
             if guest.waiting:
                 self.waiting.append(guest)
             self._look()
-            station = self._station_of(command.packet.dst)
+            station = self._rules.station_of(command.packet.dst)
             if not self._unanswered.may_be_sent(station, command.packet, now):
                 self._give_up(command, _NO_BUFFER)
                 continue
@@ -232,16 +223,16 @@ class GuestQueue:
         A broadcast waits while a word is rewritten: it may write this word.
         """
         for guest in self.waiting:
-            station = self._station_of(guest.waiting[0].packet.dst)
+            station = self._rules.station_of(guest.waiting[0].packet.dst)
             if station not in busy and not (station == BROADCAST and self._record.is_rewriting):
                 return guest
         return None
 
     def _claim(self, packet: Packet, station: int) -> Claim | None:
-        """Record a command that may write; a read needs no record."""
-        if effect_of(packet) is Effect.READS:
+        """Record a command that may change words."""
+        if not effect_of(packet).may_change_words:
             return None
-        return self._record.begin(station, self._words(packet, station))
+        return self._record.begin(station, self._rules.words_of(packet, station))
 
     def expiry(self, command: GuestCommand) -> float:
         """Return the clock value (s) from which a command is too old."""
@@ -257,9 +248,12 @@ class GuestQueue:
                 self.waiting.remove(guest)
         self._look()
 
-    def answered(self, command: GuestCommand, reply: Packet) -> None:
+    def answered(self, job: GuestJob, reply: Packet) -> None:
         """Send a reply to the guest, with the addresses and TNS of its command."""
-        guest = command.guest
+        command, guest = job.asked, job.asked.guest
+        if job.station == BROADCAST:  # no station has confirmed it
+            self._give_up(command, _NO_REPLY)
+            return
         guest.slowest = max(guest.slowest, self.line.now - command.requested)
         command.answer(command.packet.reply(reply.data, reply.sts))
 
@@ -277,8 +271,7 @@ class GuestQueue:
             outcome = outcome_of(station, job.sts, error, was_sent)
             self._record.ended(claim, outcome, may_land=outcome is Outcome.UNKNOWN)
             if was_sent:
-                command.guest.listener.wrote(
-                    command.guest, command.packet, station, list(claim.extents or ()))
+                command.guest.listener.wrote(command.guest, command.packet, claim)
         self._stations.tried(
             station, begun, self.line.now, asker=Asker.MESSAGE, was_silent=True)
 

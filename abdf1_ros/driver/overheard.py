@@ -244,7 +244,7 @@ class Overheard:
     def _written(self, command: Packet, now: float) -> None:
         """Record that a command, or its execution, may have changed words of rows."""
         effect = effect_of(command)
-        if effect is Effect.READS:
+        if not effect.may_change_words:
             return
         extents = written_extents(command, command.dst, self._mappings) \
             if effect is Effect.WRITES else None

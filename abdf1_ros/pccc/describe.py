@@ -23,7 +23,7 @@ from typing import TypeVar
 
 from abdf1_ros.df1.packet import Packet, PRIORITY_BIT, REPLY_BIT
 from abdf1_ros.errors import FormatError, RemoteError
-from abdf1_ros.pccc import diagnostics, notation
+from abdf1_ros.pccc import diagnostics, notation, range_targets
 from abdf1_ros.pccc.address import Address, AddressRefusal
 from abdf1_ros.pccc.families import decode_identity, FAMILIES
 from abdf1_ros.pccc.fields import Reader
@@ -35,6 +35,7 @@ from abdf1_ros.pccc.plc3.commands import ExtendedAddress
 from abdf1_ros.pccc.plc5.commands import SystemAddress
 from abdf1_ros.pccc.plc5.describe import system_address
 from abdf1_ros.pccc.status import check_status, EXT_BAD_ADDRESS, EXT_BAD_SYMBOL, EXT_NO_SUCH_SYMBOL
+from abdf1_ros.pccc.targets import Partner, Reach, Target
 from abdf1_ros.pccc.word_range import commands as word_range
 from abdf1_ros.text import counted, printable
 
@@ -66,15 +67,28 @@ def describe(packet: Packet, command: Packet | None = None) -> str:
     return notation.hexadecimal(data)
 
 
+def known_commands() -> dict[CommandCode, KnownCommand]:
+    """Return every command that we know, by CMD and FNC (None: it has none), in their order."""
+    return dict(sorted(_known().items(), key=lambda item: (item[0][0], item[0][1] or 0)))
+
+
 def command_codes() -> dict[CommandCode, str]:
-    """Return the name of every command that we know, by CMD and FNC (None: it has none)."""
-    return {code: entry.name for code, entry in sorted(
-        _known().items(), key=lambda item: (item[0][0], item[0][1] or 0))}
+    """Return the name of every command that we know, by CMD and FNC."""
+    return {code: entry.name for code, entry in known_commands().items()}
 
 
 def effect_of(packet: Packet) -> Effect:
     """Return what a command does, as far as we know."""
     return _entry(packet).effect
+
+
+def targets_of(packet: Packet, partner: Partner) -> frozenset[Target]:
+    """Return what a command addresses, in each form that its address may have there."""
+    try:
+        found = frozenset(_entry(packet).reach.find(Reader(_parameters(packet)), partner))
+    except FormatError:  # also an AddressRefusal
+        found = frozenset()
+    return found if found and packet.is_sound else frozenset((Target.OTHER,))
 
 
 def command_name(packet: Packet) -> str:
@@ -206,56 +220,64 @@ def _ranged(read: Callable[[Reader, Callable[[Reader], _Range]], _Request],
     return lambda reader: read(reader, _range_address)
 
 
+_PORT = Reach('', (Target.PORT,), lambda reader, partner: (Target.PORT,))
+
 # Commands of all families, or of several.
 _SHARED: dict[CommandCode, KnownCommand] = {
     (diagnostics.CMD, diagnostics.STATUS): KnownCommand(
-        'diagnostic status', Effect.READS, Reader.end, lambda request: '', _identity_reply),
+        'diagnostic status', Effect.READS, Reader.end, lambda request: '', _identity_reply,
+        _PORT),
     (diagnostics.CMD, diagnostics.READ_COUNTERS): KnownCommand(
         'read diagnostic counters', Effect.READS, diagnostics.ReadCounters.read,
         lambda request: f'at {request.address}, {counted(request.size, "byte")}',
-        _words_reply),
+        _words_reply, _PORT),
     (word_range.CMD, word_range.WRITE): KnownCommand(
-        'word range write', Effect.WRITES, _ranged(word_range.WordRangeWrite.read), _range_write),
+        'word range write', Effect.WRITES, _ranged(word_range.WordRangeWrite.read), _range_write,
+        reach=range_targets.WRITE),
     (word_range.CMD, word_range.READ): KnownCommand(
         'word range read', Effect.READS,
-        _ranged(word_range.WordRangeRead.read), _range_read, _words_reply),
+        _ranged(word_range.WordRangeRead.read), _range_read, _words_reply, range_targets.READ),
     (word_range.CMD, word_range.BIT_WRITE): KnownCommand(
-        'bit write', Effect.WRITES, _ranged(word_range.WordBitWrite.read), _bit_write),
+        'bit write', Effect.WRITES, _ranged(word_range.WordBitWrite.read), _bit_write,
+        reach=range_targets.BIT_WRITE),
     (word_range.CMD, word_range.FILE_READ): KnownCommand(
         'file read', Effect.READS,
-        _ranged(word_range.WordRangeRead.read), _range_read, _words_reply),
+        _ranged(word_range.WordRangeRead.read), _range_read, _words_reply, range_targets.READ),
 }
 
 # All other commands (M 7-2, 7-3; 0F/94 is from practice); their parameters are given as bytes.
 _NAMED: dict[CommandCode, KnownCommand] = {
-    (0x06, 0x00): KnownCommand('echo', Effect.READS),
-    (0x0F, 0x03): KnownCommand('file write', Effect.WRITES),
-    (0x0F, 0x29): KnownCommand('read section size', Effect.READS),
-    (0x0F, 0x79): KnownCommand('read-modify-write N', Effect.WRITES),
+    (0x06, 0x00): KnownCommand('echo', Effect.READS, reach=_PORT),
+    (0x06, 0x09): KnownCommand('read link parameters', Effect.READS, reach=_PORT),
+    (0x0F, 0x03): KnownCommand('file write', Effect.WRITES, reach=range_targets.WRITE),
+    (0x0F, 0x29): KnownCommand('read section size', Effect.READS, reach=range_targets.SIZE),
     (0x0F, 0x94): KnownCommand('read file information', Effect.READS),
     # In no manual, but in a recording of a MicroLogix 1400. Each item is FF and an address.
     (0x0F, 0xA3): KnownCommand('read of words by physical address', Effect.READS),
-} | {code: KnownCommand(name) for code, name in {
-    (0x03, None): 'physical write', (0x04, None): 'physical read',
+} | {code: KnownCommand(name, Effect.READS) for code, name in {
+    (0x04, None): 'physical read',
+    (0x0F, 0x09): 'physical read', (0x0F, 0x17): 'read bytes physical',
+    (0x0F, 0xA7): 'protected typed file read',
+}.items()} | {code: KnownCommand(name, Effect.KEEPS) for code, name in {
+    (0x06, 0x02): 'set variables', (0x06, 0x04): 'set timeout', (0x06, 0x05): 'set NAKs',
+    (0x06, 0x06): 'set ENQs', (0x06, 0x07): 'reset diagnostic counters',
+    (0x0F, 0x06): 'upload request', (0x0F, 0x11): 'get edit resource',
+    (0x0F, 0x12): 'return edit resource', (0x0F, 0x53): 'upload all',
+    (0x0F, 0x55): 'upload completed', (0x0F, 0x81): 'open file', (0x0F, 0x82): 'close file',
+}.items()} | {code: KnownCommand(name) for code, name in {
+    (0x03, None): 'physical write',
     # CIP of a Logix controller on its serial port (1756-PM020F p. 75).
     (0x0A, None): 'connected CIP message', (0x0B, None): 'unconnected CIP message',
-    (0x06, 0x02): 'set variables', (0x06, 0x04): 'set timeout', (0x06, 0x05): 'set NAKs',
-    (0x06, 0x06): 'set ENQs',
-    (0x06, 0x07): 'reset diagnostic counters', (0x06, 0x08): 'set data table size',
-    (0x06, 0x09): 'read link parameters', (0x06, 0x0A): 'set link parameters',
+    (0x06, 0x08): 'set data table size', (0x06, 0x0A): 'set link parameters',
     (0x07, 0x00): 'disable outputs', (0x07, 0x01): 'enable outputs',
     (0x07, 0x03): 'enable scan', (0x07, 0x04): 'enter download mode',
     (0x07, 0x05): 'exit download or upload mode', (0x07, 0x06): 'enter upload mode',
-    (0x0F, 0x05): 'download request', (0x0F, 0x06): 'upload request',
-    (0x0F, 0x07): 'shut down', (0x0F, 0x08): 'physical write', (0x0F, 0x09): 'physical read',
-    (0x0F, 0x0A): 'restart', (0x0F, 0x11): 'get edit resource',
-    (0x0F, 0x12): 'return edit resource', (0x0F, 0x17): 'read bytes physical',
+    (0x0F, 0x05): 'download request', (0x0F, 0x07): 'shut down',
+    (0x0F, 0x08): 'physical write', (0x0F, 0x0A): 'restart',
     (0x0F, 0x18): 'write bytes physical', (0x0F, 0x3A): 'set CPU mode',
     (0x0F, 0x41): 'disable forces', (0x0F, 0x50): 'download all',
-    (0x0F, 0x52): 'download completed', (0x0F, 0x53): 'upload all',
-    (0x0F, 0x55): 'upload completed', (0x0F, 0x57): 'initialize memory',
+    (0x0F, 0x52): 'download completed', (0x0F, 0x57): 'initialize memory',
     (0x0F, 0x5E): 'modify compatibility file', (0x0F, 0x80): 'change mode',
-    (0x0F, 0x81): 'open file', (0x0F, 0x82): 'close file',
     (0x0F, 0x88): 'execute command list', (0x0F, 0x8F): 'apply port configuration',
-    (0x0F, 0xA7): 'protected typed file read', (0x0F, 0xAF): 'protected typed file write',
+    (0x0F, 0xAF): 'protected typed file write',
 }.items()}

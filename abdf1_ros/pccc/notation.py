@@ -26,6 +26,7 @@ from typing import Any, TypeAlias
 from abdf1_ros.pccc.address import Address, Addressing
 from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.file_types import FileType
+from abdf1_ros.pccc.targets import Reach, UNKNOWN
 from abdf1_ros.text import counted, value_text
 
 CommandCode = tuple[int, int | None]
@@ -36,11 +37,21 @@ Fields: TypeAlias = Any
 
 
 class Effect(Enum):
-    """The effect of a command; it decides whether a guest may send the command."""
+    """
+    The effect of a command on the words of a PLC.
+
+    ``KEEPS``: it does more than read, but changes no words: it sets the port, or uploads.
+    """
 
     READS = 'reads'
     WRITES = 'writes data'
+    KEEPS = 'changes no words'
     OTHER = ''
+
+    @property
+    def may_change_words(self) -> bool:
+        """Tell whether words may have changed after a command with this effect."""
+        return self in (Effect.WRITES, Effect.OTHER)
 
 
 def hexadecimal(data: bytes) -> str:
@@ -50,13 +61,14 @@ def hexadecimal(data: bytes) -> str:
 
 @dataclass(frozen=True, slots=True)
 class KnownCommand:
-    """A command: its effect, its reader, its text, and the text of its reply."""
+    """A command: its effect, reader and text, the text of its reply, and what it can address."""
 
     name: str
     effect: Effect = Effect.OTHER
     read: Callable[[Reader], Fields] = Reader.rest
     words: Callable[[Fields], str] = hexadecimal
     values: Callable[[Fields, bytes], str] = lambda request, data: hexadecimal(data)
+    reach: Reach = UNKNOWN
 
 
 def part_of(offset: int, size: int, total: int) -> str:

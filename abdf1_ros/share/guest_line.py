@@ -27,7 +27,8 @@ from abdf1_ros.df1.peer import FullDuplexPeer
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import TaskSource
-from abdf1_ros.driver.guests import Guest, GuestCommand, GuestListener, GuestQueue, ShareAccess
+from abdf1_ros.driver.guest_rules import ShareAccess
+from abdf1_ros.driver.guests import Guest, GuestCommand, GuestListener, GuestQueue
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.descriptor import Port
 from abdf1_ros.ports.endpoints import Endpoint, PtyPlace, SerialEndpoint, TcpEndpoint

@@ -36,7 +36,7 @@ from abdf1_ros.df1.frames import ACK, Code, message_frame
 from abdf1_ros.df1.packet import BROADCAST, Packet, STS_NOT_DELIVERED
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave
-from abdf1_ros.driver.guests import ShareAccess
+from abdf1_ros.driver.guest_rules import ShareAccess
 from abdf1_ros.driver.interlocks.plc import Plc
 from abdf1_ros.driver.job_tasks import Job
 from abdf1_ros.driver.settings import DriverSettings

@@ -17,7 +17,8 @@
 from collections.abc import Sequence
 
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.driver.guests import Guest, GuestCommand, ShareAccess
+from abdf1_ros.driver.guest_rules import ShareAccess
+from abdf1_ros.driver.guests import Guest, GuestCommand
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome
 from abdf1_ros.settings.heartbeats import Fallback

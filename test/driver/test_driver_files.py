@@ -17,7 +17,7 @@
 from collections.abc import Callable
 
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.driver.guests import ShareAccess
+from abdf1_ros.driver.guest_rules import ShareAccess
 from abdf1_ros.driver.write import Outcome
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.file_types import PlcType
@@ -121,10 +121,11 @@ def test_guests_write_goes_after_the_word_is_written_back(polling: str, dst: int
     mapping = make_mapping('B3:1/4', 'Write', plc='SLC', processor='5/01')
     bench, plc = old_bench(mapping, polling)
     bench.write(mapping, [1], run=0.5)  # of the next write only one packet goes before guests
-    program, two = Program(bench, ShareAccess.WRITE), bytes.fromhex('AA 02 03 85 01 00 02 00')
+    program, two = Program(bench, ShareAccess.ALL), bytes.fromhex('AA 02 03 85 01 00 02 00')
     plc.meanwhile = lambda function: function == slc.LOGICAL_READ and program.ask(two, dst)
     bench.write(mapping, [0], run=0.5)
-    assert (program.statuses, stored(plc, 'B3:1')) == ([0], b'\2\0')
+    confirmed = 0x05 if dst == 255 else 0
+    assert (program.statuses, stored(plc, 'B3:1')) == ([confirmed], b'\2\0')
 
 
 def test_flat_io_is_read_and_written_through_the_slots() -> None:

@@ -21,7 +21,7 @@ from functools import partial
 from random import Random
 
 from abdf1_ros.df1.frames import EOT
-from abdf1_ros.driver.guests import ShareAccess
+from abdf1_ros.driver.guest_rules import ShareAccess
 from abdf1_ros.driver.interlocks.heartbeat import BeatState
 from abdf1_ros.settings.network import Network
 import pytest

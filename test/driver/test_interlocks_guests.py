@@ -21,7 +21,8 @@ from itertools import count
 import math
 
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.driver.guests import Guest, GuestCommand, ShareAccess
+from abdf1_ros.driver.guest_rules import ShareAccess
+from abdf1_ros.driver.guests import Guest, GuestCommand
 from abdf1_ros.driver.interlocks.fallback import FallbackState
 from abdf1_ros.driver.record import Claim
 from abdf1_ros.driver.write import Outcome

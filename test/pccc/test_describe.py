@@ -134,9 +134,10 @@ def test_codes_of_commands_are_those_of_the_manual() -> None:
 
 
 @for_all(('cmd', 'effect', 'functions'), [
-    (0x06, Effect.READS, '00 01 03'), (0x06, Effect.WRITES, ''),
+    (0x06, Effect.READS, '00 01 03 09'), (0x06, Effect.WRITES, ''),
+    (0x06, Effect.KEEPS, '02 04 05 06 07'), (0x0F, Effect.KEEPS, '06 11 12 53 55 81 82'),
     (0x07, Effect.READS, ''), (0x07, Effect.WRITES, ''),
-    (0x0F, Effect.READS, '01 04 29 68 94 A1 A2 A3'),
+    (0x0F, Effect.READS, '01 04 09 17 29 68 94 A1 A2 A3 A7'),
     (0x0F, Effect.WRITES, '00 02 03 26 67 79 A9 AA AB')])
 def test_no_other_command_counts_as_a_read_or_as_a_write_alone(
         cmd: int, effect: Effect, functions: str) -> None:

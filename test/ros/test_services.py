@@ -24,7 +24,7 @@ import time
 from typing import Any, cast
 
 from abdf1_ros.driver.driver import Driver
-from abdf1_ros.driver.guests import ShareAccess
+from abdf1_ros.driver.guest_rules import ShareAccess
 from abdf1_ros.driver.reads.demands import ReadAnswer
 from abdf1_ros.driver.write import Outcome, WriteResult
 from abdf1_ros.ports.clock import line_time

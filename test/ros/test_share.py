@@ -22,14 +22,18 @@ from unittest.mock import Mock
 from abdf1_ros.cli.sniff import main as sniff
 from abdf1_ros.client import Client
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.driver.guests import Guest
+from abdf1_ros.driver.guest_rules import ShareAccess
+from abdf1_ros.driver.guests import Guest, GuestCommand
+from abdf1_ros.driver.record import Claim
 from abdf1_ros.errors import RemoteError
 from abdf1_ros.ros.bridge.guests import GuestPlaces
+from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.share.guest_line import GuestLine
 import pytest
 from std_msgs.msg import Float32MultiArray
 from support.device_server import OWN_HOST
+from support.driver_bench import DriverBench
 from support.mappings import make_mapping
 from support.ros import Observer, OK, Process, until_status, WARN
 from support.simulator_process import make_files, OFTEN
@@ -87,24 +91,69 @@ def test_what_is_not_allowed_and_who_is_turned_away_is_told_once(tmp_path: Path)
             with socket.create_connection(address) as second, suppress(ConnectionResetError):
                 assert second.recv(1) == b''
             assert hmi.read('F8:4') == 21.5
-        node.wait_for('[WARN] ', f'guest tcp:{place}: command refused: protected typed logical '
-                      'write F8:4 = 30.5; Share_Access is Read')
+        node.wait_for('[WARN] ', f'guest tcp:{place}: command refused: 0F/AA to station 2, '
+                      'protected typed logical write F8:4 = 30.5; it needs Share_Access Write, '
+                      'and has Read')
         node.wait_for('[WARN] ', f'guest tcp:{place}: a second program, at 127.0.0.1:',
                       ', was refused: a place takes one program at a time')
         node.end()
     assert node.text.count('command refused') == 1
 
 
+def told_by(notes: Mock) -> list[str]:
+    return [call.args[1] for call in notes.warning.call_args_list]
+
+
+def places_of(*rows: Mapping) -> tuple[GuestPlaces, Mock]:
+    """Return places that tell of guests of a map, and where they tell it."""
+    notes = Mock()
+    return GuestPlaces(Mock(network=Network()), Mock(mappings=rows), Mock(), notes, Mock()), notes
+
+
+def test_write_that_may_be_to_words_of_the_bridge_is_told_with_its_rows() -> None:
+    rows = [make_mapping('N7:9', 'Heartbeat', tag='alive'), make_mapping('N7:0'),
+            *(make_mapping('N7:9', 'Write', tag=tag) for tag in 'ab'),
+            make_mapping('N7:9', 'Write', tag='far', station=2),
+            make_mapping('N7:8', 'Serve', tag='ours', station=0)]
+    places, notes = places_of(*rows)
+    guest = Guest('pty:a')
+    file_write = Packet(1, 0, 15, 0, 7, bytes.fromhex('03 00 00 01 00 06 07 09 11 22'))
+    text = 'guest pty:a has sent to station 1: file write 00 00 01 00 06 07 09 11 22'
+    for words in ([row.extent for row in rows[1::-1]], [rows[1].extent], None):
+        places.wrote(guest, file_write, Claim(1, words))
+    assert (guest.collisions, told_by(notes)) == (2, [
+        f'{text}, words of alive, a, b',
+        f'{text}, which words is not known: they may be those of alive, a, b'])
+    places.wrote(guest, file_write, Claim(255, None))
+    assert told_by(notes)[-1].endswith('they may be those of alive, a, b, far')
+
+
+def test_first_command_that_only_all_allows_is_told_whatever_the_right_of_the_guest() -> None:
+    read = Packet(1, 9, 15, 0, 7, bytes.fromhex('A2 02 07 89 00 00'))
+    write = Packet(1, 9, 15, 0, 7, bytes.fromhex('AA 02 07 89 00 00 11 22'))
+    ladder = Packet(1, 9, 15, 0, 7, bytes.fromhex('A2 50 02 22 00 00'))
+    queue = DriverBench([make_mapping('N7:0', plc='SLC')]).driver.guests
+    places, notes = places_of()
+    for access in ShareAccess:
+        guest = Guest('tcp:1', access, places)
+        for command in (read, write, ladder, write, ladder):
+            queue.put(GuestCommand(guest, command, 0.0, Mock()))
+    refused = 'guest tcp:1: command refused: 0F/A'
+    assert told_by(notes) == [
+        refused + 'A to station 1, protected typed logical write N7:0 = 8721; it needs '
+        'Share_Access Write, and has Read',
+        refused + '2 to station 1, protected typed logical read file 2 type 22 element 0, '
+        '40 words; it needs Share_Access All, and has Read',
+        refused + '2 to station 1, protected typed logical read file 2 type 22 element 0, '
+        '40 words; it needs Share_Access All, and has Write',
+        'guest tcp:1: first command that only Share_Access All allows: 0F/A2 to station 1, '
+        'protected typed logical read file 2 type 22 element 0, 40 words']
+
+
 def test_internal_error_in_the_line_of_a_guest_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(GuestLine, 'open_port', Mock(side_effect=KeyError('a bug')))
     line, notes = Mock(network=Network(share='tcp:4501')), Mock()
-    rows = [make_mapping('N7:9', 'Heartbeat', tag='alive'), make_mapping('N7:0'),
-            *(make_mapping('N7:9', 'Write', tag=tag) for tag in 'ab')]
-    places = GuestPlaces(line, Mock(mappings=rows), Mock(), notes, Mock())
-    guest = Guest('pty:a')
-    places.wrote(guest, Packet(1, 0, 6, 0, 7, b'\x03'), 1, [row.extent for row in rows[1::-1]])
-    assert (guest.collisions, *notes.warning.call_args.args) == (1, 'writes of pty:a', (
-        'guest pty:a has sent to station 1: diagnostic status, words of alive, a, b'))
+    places = GuestPlaces(line, Mock(), Mock(), notes, Mock())
     for _ in range(2):
         places.start()
     places.lines[0].link.join()

@@ -25,6 +25,7 @@ from abdf1_ros.df1.machine import LineTiming
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.agenda import Agenda
 from abdf1_ros.driver.checks import Checks
+from abdf1_ros.driver.guest_rules import GuestRules
 from abdf1_ros.driver.guests import GuestQueue
 from abdf1_ros.driver.interlocks.queue import Interlocks
 from abdf1_ros.driver.job_tasks import JobTasks
@@ -89,8 +90,8 @@ class Bench:
         served = Served(PlcType.PLC5, Rows(), readings.served)
         interlocks = Interlocks(Rows(), self.writes, writing, served, listener,
                                 lambda mapping, text, is_conflict: None)
-        guests = GuestQueue(self.stations, line, 1.0, lambda dst: dst,
-                            lambda command, station: [], self.record)
+        rules = GuestRules(Network(), Rows(), lambda station: None)
+        guests = GuestQueue(self.stations, line, 1.0, rules, self.record)
         self.agenda = Agenda(
             self.stations, interlocks, self.writes, checks, self.reads, guests, self.tasks)
         self.reads.replace((), jobs, 0.0)

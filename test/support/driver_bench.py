@@ -30,7 +30,8 @@ from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import multidrop, Responder
 from abdf1_ros.df1.stations import ActiveStationList, Station
 from abdf1_ros.driver.driver import Driver, Listener
-from abdf1_ros.driver.guests import Guest, GuestCommand, ShareAccess
+from abdf1_ros.driver.guest_rules import ShareAccess
+from abdf1_ros.driver.guests import Guest, GuestCommand
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome, WriteResult
 from abdf1_ros.errors import PortLost

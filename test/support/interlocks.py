@@ -20,7 +20,8 @@ from functools import partial
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave
-from abdf1_ros.driver.guests import Guest, GuestCommand, ShareAccess
+from abdf1_ros.driver.guest_rules import ShareAccess
+from abdf1_ros.driver.guests import Guest, GuestCommand
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.settings.heartbeats import Fallback, While

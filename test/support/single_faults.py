@@ -35,7 +35,8 @@ from random import Random
 from abdf1_ros.df1.frames import Duplex, Frame, FrameDecoder, NAK
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.driver import Driver
-from abdf1_ros.driver.guests import Guest, GuestCommand, ShareAccess
+from abdf1_ros.driver.guest_rules import ShareAccess
+from abdf1_ros.driver.guests import Guest, GuestCommand
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome
 from abdf1_ros.plan.bounds import Times

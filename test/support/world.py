@@ -50,7 +50,8 @@ from abdf1_ros.df1.frames import ACK, DLE, Duplex, SOH, stuff, STX
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.settings import LinkSettings, PollingSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave
-from abdf1_ros.driver.guests import Guest, GuestCommand, ShareAccess
+from abdf1_ros.driver.guest_rules import ShareAccess
+from abdf1_ros.driver.guests import Guest, GuestCommand
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import WriteResult
 from abdf1_ros.driver.writes.ages import Ages, HostClock, most_ahead

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from abdf1_ros.pccc.notation import CommandCode, Effect, KnownCommand, words_text
 from abdf1_ros.pccc.plc2 import commands as plc2
+from abdf1_ros.pccc.plc2 import targets
 from abdf1_ros.pccc.plc2.address import show_word
 from abdf1_ros.text import counted
 
@@ -44,12 +45,17 @@ def _bit_write(request: plc2.BasicBitWrite) -> str:
 DESCRIBED: dict[CommandCode, KnownCommand] = {
     (plc2.READ, None): KnownCommand(
         'unprotected read', Effect.READS,
-        plc2.BasicRead.read, _read, lambda request, data: words_text(data)),
+        plc2.BasicRead.read, _read, lambda request, data: words_text(data),
+        reach=targets.READ),
     (plc2.UNPROTECTED_WRITE, None): KnownCommand(
-        'unprotected write', Effect.WRITES, plc2.BasicWrite.read, _write),
+        'unprotected write', Effect.WRITES, plc2.BasicWrite.read, _write,
+        reach=targets.WRITE),
     (plc2.PROTECTED_WRITE, None): KnownCommand(
-        'protected write', Effect.WRITES, plc2.BasicWrite.read, _write),
+        'protected write', Effect.WRITES, plc2.BasicWrite.read, _write,
+        reach=targets.WRITE),
     (plc2.UNPROTECTED_BIT_WRITE, None): KnownCommand(
-        'unprotected bit write', Effect.WRITES, plc2.BasicBitWrite.read, _bit_write),
+        'unprotected bit write', Effect.WRITES, plc2.BasicBitWrite.read, _bit_write,
+        reach=targets.BIT_WRITE),
     (plc2.PROTECTED_BIT_WRITE, None): KnownCommand(
-        'protected bit write', Effect.WRITES, plc2.BasicBitWrite.read, _bit_write)}
+        'protected bit write', Effect.WRITES, plc2.BasicBitWrite.read, _bit_write,
+        reach=targets.BIT_WRITE)}

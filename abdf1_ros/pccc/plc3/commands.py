@@ -59,22 +59,29 @@ class ExtendedAddress:
 
         Raises AddressRefusal for symbols and other memory, FormatError when bytes run out.
         """
-        flag = reader.byte()
-        if flag == 0:
-            raise _no_symbol(reader)
-        if flag >> len(_DEFAULTS):
-            raise AddressRefusal(status.EXT_TOO_MANY_LEVELS,
-                                 f'address flag {flag:02X} has more levels than a PLC-3')
-        if flag.bit_length() < _LEAST_LEVELS:
-            raise AddressRefusal(status.EXT_TOO_FEW_LEVELS,
-                                 f'address flag {flag:02X} does not reach a file')
-        area, context, *levels = (
-            reader.number() if flag >> n & 1 else default
-            for n, default in enumerate(_DEFAULTS))
+        area, context, *levels = read_levels(reader)
         if (area, context) != (DATA_TABLE, CONTEXT):
             raise AddressRefusal(status.EXT_BAD_ADDRESS, (
                 f'E{area}.{context} is not the data table of context {CONTEXT}'))
         return cls(*levels)
+
+
+def read_levels(reader: Reader) -> list[int]:
+    """
+    Take the six levels of an address in any memory off ``reader``.
+
+    Raises AddressRefusal for symbols, FormatError when bytes run out.
+    """
+    flag = reader.byte()
+    if flag == 0:
+        raise _no_symbol(reader)
+    if flag >> len(_DEFAULTS):
+        raise AddressRefusal(status.EXT_TOO_MANY_LEVELS,
+                             f'address flag {flag:02X} has more levels than a PLC-3')
+    if flag.bit_length() < _LEAST_LEVELS:
+        raise AddressRefusal(status.EXT_TOO_FEW_LEVELS,
+                             f'address flag {flag:02X} does not reach a file')
+    return [reader.number() if flag >> n & 1 else default for n, default in enumerate(_DEFAULTS)]
 
 
 def _no_symbol(reader: Reader) -> AddressRefusal:

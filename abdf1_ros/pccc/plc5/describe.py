@@ -21,6 +21,7 @@ from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.file_types import FileType
 from abdf1_ros.pccc.notation import CommandCode, Effect, KnownCommand
 from abdf1_ros.pccc.plc5 import commands as plc5
+from abdf1_ros.pccc.plc5 import targets
 from abdf1_ros.pccc.plc5.address import ADDRESSING
 from abdf1_ros.pccc.typed_data import TypedData
 from abdf1_ros.text import counted
@@ -88,8 +89,13 @@ def _read_modify_write(request: plc5.ReadModifyWrite) -> str:
 
 DESCRIBED: dict[CommandCode, KnownCommand] = {
     (plc5.CMD, plc5.READ_MODIFY_WRITE): KnownCommand(
-        'read-modify-write', Effect.WRITES, plc5.ReadModifyWrite.read, _read_modify_write),
+        'read-modify-write', Effect.WRITES, plc5.ReadModifyWrite.read, _read_modify_write,
+        reach=targets.READ_MODIFY_WRITE),
     (plc5.CMD, plc5.TYPED_WRITE): KnownCommand(
-        'typed write', Effect.WRITES, plc5.TypedWrite.read, _typed_write),
+        'typed write', Effect.WRITES, plc5.TypedWrite.read, _typed_write,
+        reach=targets.TYPED_WRITE),
     (plc5.CMD, plc5.TYPED_READ): KnownCommand(
-        'typed read', Effect.READS, plc5.TypedRead.read, _typed_read, _typed_reply)}
+        'typed read', Effect.READS, plc5.TypedRead.read, _typed_read, _typed_reply,
+        reach=targets.TYPED_READ),
+    (plc5.CMD, 0x79): KnownCommand(
+        'read-modify-write N', Effect.WRITES, reach=targets.READ_MODIFY_WRITE_N)}

@@ -20,7 +20,7 @@ from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.family import Family
 from abdf1_ros.pccc.processor import USUAL
 from abdf1_ros.pccc.slc import identity
-from abdf1_ros.pccc.slc.address import ADDRESSING
+from abdf1_ros.pccc.slc.address import ADDRESSING, CLOCK
 from abdf1_ros.pccc.slc.describe import DESCRIBED
 from abdf1_ros.pccc.slc.dialect import BY_PROCESSOR
 from abdf1_ros.pccc.slc.file_search import SlcFileSearch
@@ -40,4 +40,4 @@ FAMILY = Family(
     SlcCommands, identity.decode, identity.encode, DESCRIBED, MEANINGS,
     by_processor=BY_PROCESSOR, served_counters=identity.served_counters,
     max_echo=236,  # of an SLC 5/03 and later (M 7-8)
-    file_search=SlcFileSearch(), clock='S:37')  # 1747-RM001G B-54
+    file_search=SlcFileSearch(), clock=str(CLOCK))

@@ -122,3 +122,6 @@ class _SlcAddressing(FileAddressing):
 
 
 ADDRESSING = _SlcAddressing()
+
+CLOCK = ADDRESSING.parse('S:37')
+"""The first of six words: year, month, day, hour, minute, second (1747-RM001G B-54)."""

@@ -21,6 +21,7 @@ from functools import partial
 from abdf1_ros.pccc import notation
 from abdf1_ros.pccc.notation import CommandCode, Effect, KnownCommand
 from abdf1_ros.pccc.slc import commands as slc
+from abdf1_ros.pccc.slc import targets
 from abdf1_ros.pccc.slc.address import ADDRESSING, BY_CODE
 from abdf1_ros.pccc.slc.commands import LogicalRead, LogicalWrite
 from abdf1_ros.text import counted
@@ -74,13 +75,16 @@ def _masked_write(request: slc.MaskedWrite) -> str:
 DESCRIBED: dict[CommandCode, KnownCommand] = {
     (slc.CMD, slc.SHORT_READ): KnownCommand(
         'protected typed logical read', Effect.READS,
-        partial(LogicalRead.read, is_short=True), _read, _reply),
+        partial(LogicalRead.read, is_short=True), _read, _reply, targets.SHORT_READ),
     (slc.CMD, slc.LOGICAL_READ): KnownCommand(
-        'protected typed logical read', Effect.READS, LogicalRead.read, _read, _reply),
+        'protected typed logical read', Effect.READS, LogicalRead.read, _read, _reply,
+        targets.LOGICAL_READ),
     (slc.CMD, slc.SHORT_WRITE): KnownCommand(
         'protected typed logical write', Effect.WRITES,
-        partial(LogicalWrite.read, is_short=True), _write),
+        partial(LogicalWrite.read, is_short=True), _write, reach=targets.SHORT_WRITE),
     (slc.CMD, slc.LOGICAL_WRITE): KnownCommand(
-        'protected typed logical write', Effect.WRITES, LogicalWrite.read, _write),
+        'protected typed logical write', Effect.WRITES, LogicalWrite.read, _write,
+        reach=targets.LOGICAL_WRITE),
     (slc.CMD, slc.MASKED_WRITE): KnownCommand(
-        'masked write', Effect.WRITES, slc.MaskedWrite.read, _masked_write)}
+        'masked write', Effect.WRITES, slc.MaskedWrite.read, _masked_write,
+        reach=targets.MASKED_WRITE)}

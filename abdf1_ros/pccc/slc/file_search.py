@@ -86,6 +86,19 @@ _DIRECTORIES = {
     Processor.ML1400: Directory(0x03, 103)}
 
 
+def list_codes(processor: Processor | None) -> tuple[int, ...]:
+    """
+    Return the types that file 0 of a processor may have as its file directory.
+
+    The type of a MicroLogix 1400 is left out where the processor is not known: that file has the
+    passwords, too (CVE-2017-14466).
+    """
+    if processor is None:
+        return SLC_DIRECTORY.type_code, _MICROLOGIX.type_code
+    layout = _DIRECTORIES.get(processor)
+    return () if layout is None else (layout.type_code,)
+
+
 class SlcFileSearch:
     """Search in the file directory if the processor is known to have one, else by reads."""
 

@@ -21,9 +21,10 @@ from dataclasses import replace
 
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.driver import Driver
+from abdf1_ros.driver.guest_rules import ShareAccess
 from abdf1_ros.driver.guests import Guest, GuestListener
-from abdf1_ros.pccc.describe import describe
-from abdf1_ros.pccc.extent import Extent
+from abdf1_ros.driver.record import Claim
+from abdf1_ros.pccc.describe import command_name, describe
 from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.ros.diagnostics.log import LimitedLog
 from abdf1_ros.ros.parameters.declared import Configuration
@@ -76,15 +77,24 @@ class GuestPlaces(GuestListener):
             f'guest {guest.name}: a second program, at {other}, was refused: a place takes '
             'one program at a time'))
 
-    def wrote(self, guest: Guest, command: Packet, station: int, words: list[Extent]) -> None:
+    def wrote(self, guest: Guest, command: Packet, claim: Claim) -> None:
         """Log that a guest has sent a write to words that this bridge writes too."""
-        rows = [row for row in self._driver.mappings if row.changes and any(
-                row.extent.meets(extent) for extent in words)]
+        rows = [row for row in self._driver.mappings if row.changes and claim.meets(row.extent)]
         if rows:
             guest.collisions += 1
+            what = 'words of' if claim.extents is not None \
+                else 'which words is not known: they may be those of'
             self._notes.warning(
-                f'writes of {guest.name}', f'guest {guest.name} has sent to station {station}: '
-                f'{describe(command)}, words of {first([row.tag for row in rows])}')
+                f'writes of {guest.name}', f'guest {guest.name} has sent to station '
+                f'{claim.station}: {describe(command)}, {what} '
+                f'{first([row.tag for row in rows])}')
+
+    def goes_beyond(self, guest: Guest, command: Packet) -> None:
+        """Log only the first command that is not for data."""
+        if guest.beyond == 1:
+            self._notes.warning(f'guest {guest.name}', (
+                f'guest {guest.name}: first command that only Share_Access All allows: '
+                f'{_meant(command)}'))
 
     def was_unanswered(self, guest: Guest, command: Packet, sts: int) -> None:
         """Log only the first command without a reply: a scan asks hundreds of stations."""
@@ -93,13 +103,18 @@ class GuestPlaces(GuestListener):
                 f'guest {guest.name} gets no reply from station {command.dst} to '
                 f'{describe(command)}, but STS {sts:02X}; the status "guests" counts them all'))
 
-    def was_refused(self, guest: Guest, command: Packet) -> None:
-        """Log only the first command that is not allowed."""
-        if guest.refused == 1:
+    def was_refused(self, guest: Guest, command: Packet, needed: ShareAccess) -> None:
+        """Log only the first command that is not allowed, and the first that needs All."""
+        if guest.refused == 1 or needed is ShareAccess.ALL and guest.beyond == 1:
             self._notes.warning(f'guest {guest.name}', (
-                f'guest {guest.name}: command refused: {describe(command)}; Share_Access is '
-                f'{guest.access.value}'))
+                f'guest {guest.name}: command refused: {_meant(command)}; it needs Share_Access '
+                f'{needed.value}, and has {guest.access.value}'))
 
     def _fault(self, error: Exception) -> None:
         self._notes.error(
             'guests', f'internal error in the line of a guest: {error!r}; please report it')
+
+
+def _meant(command: Packet) -> str:
+    """Return a command in words, with its code and the station in it."""
+    return f'{command_name(command)} to station {command.dst}, {describe(command)}'

@@ -23,7 +23,8 @@ from abdf1_ros.df1 import frames
 from abdf1_ros.df1.frames import Frame, FrameDecoder, MAX_WAITING
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.driver import Driver
-from abdf1_ros.driver.guests import Guest, GuestCommand, ShareAccess
+from abdf1_ros.driver.guest_rules import ShareAccess
+from abdf1_ros.driver.guests import Guest, GuestCommand
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.errors import PortLost
 from abdf1_ros.pccc.values import Values
