@@ -48,15 +48,17 @@ class Trace:
 
     ``has_failed`` tells this too. A thread of its own writes the capture, so the line does not
     wait for a disk. If the disk is too slow, chunks are lost. The capture and ``on_error`` report
-    this loss. ``limit`` is the most bytes on the disk. Raises OSError if the capture cannot be
-    begun.
+    this loss. ``on_news`` reports what another program has done to the file. ``limit`` is the most
+    bytes on the disk. Raises OSError if the capture cannot be begun.
     """
 
     def __init__(self, path: str, settings: dict[str, str], on_error: Callable[[str], None],
-                 limit: float = math.inf) -> None:
+                 limit: float = math.inf, on_news: Callable[[str], None] | None = None) -> None:
         self._path = path
         self._on_error = on_error
-        self._writer = CaptureWriter(Path(path), limit, settings)
+        tell = on_news or on_error
+        self._writer = CaptureWriter(
+            Path(path), limit, settings, lambda text: tell(f'{path} {text}'))
         # a number says how many chunks were lost at this place
         self._waiting: SimpleQueue[Chunk | str | dict[str, str] | int | None] = SimpleQueue()
         self._lost = 0
@@ -141,7 +143,8 @@ class PortOpener:
 
     ``tell`` is called with options that the port does not have, but not at each opening anew.
     After ``trace``, a capture records all bytes of the port from its next opening on. An error of
-    the capture is given to ``on_error``, and has no effect on the port.
+    the capture is given to ``on_error``, and has no effect on the port; ``on_news`` as in
+    ``Trace``.
     """
 
     def __init__(self, settings: PortSettings,
@@ -171,12 +174,13 @@ class PortOpener:
         return self._port.errors() if self._port else {}
 
     def trace(self, path: str, limit: float, head: dict[str, str],
-              on_error: Callable[[str], None]) -> None:
+              on_error: Callable[[str], None],
+              on_news: Callable[[str], None] | None = None) -> None:
         """Begin a capture of at most ``limit`` bytes; ``head`` has the settings of the line."""
         settings = {'begun': begun_now(), **self._head(head)}
         self._begun = time.monotonic()
         try:
-            self._trace = Trace(path, settings, on_error, limit)
+            self._trace = Trace(path, settings, on_error, limit, on_news)
         except OSError as error:
             on_error(f'{error.filename or path}: {error.strerror}; nothing is recorded')
 

@@ -39,7 +39,7 @@ A chunk has the seconds since ``begun``, its direction, and its bytes in hexadec
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from enum import Enum
 import errno
@@ -103,22 +103,26 @@ class CaptureWriter:
     Every line is given to the operating system at once, whole or not at all. Raises OSError, also
     if ``path`` or ``<path>.1`` exists and is not a capture, or is being written by another; such a
     file is not changed.
+
+    If another program has cut, moved or deleted the file, as logrotate does, the capture begins
+    again with the next line; ``tell`` is called with what was done to it.
     """
 
     def __init__(self, path: Path, limit: float = math.inf,
-                 settings: Mapping[str, str] | None = None) -> None:
+                 settings: Mapping[str, str] | None = None,
+                 tell: Callable[[str], None] = lambda text: None) -> None:
         self.path = path
         self._limit = limit / 2
         self._settings = dict(settings or {})
+        self._tell = tell
         self._written = 0
-        for place in (path, Path(f'{path}.1')):
-            if place.exists() and not may_replace(place, _MAGIC.encode()):
-                raise OSError(errno.EEXIST, 'exists and is not a capture; give another name',
-                              str(place))
-            if place.exists() and _is_locked(place):
-                raise OSError(errno.EBUSY, 'is being written by another; give another name',
-                              str(place))
+        for place in (path, self._older):
+            _check_free(place)
         self._begin()
+
+    @property
+    def _older(self) -> Path:
+        return Path(f'{self.path}.1')
 
     def write(self, chunk: Chunk | str | dict[str, str]) -> None:
         """Write a chunk, a line from ``setting_line``, or settings of the next files too."""
@@ -127,6 +131,7 @@ class CaptureWriter:
             for name, value in chunk.items():
                 self.write(setting_line(name, value))
             return
+        self._follow()
         line = str(chunk)
         if self._written + len(line) + 1 > self._limit:
             self._file.close()
@@ -136,13 +141,43 @@ class CaptureWriter:
     def close(self) -> None:
         self._file.close()
 
+    def _follow(self) -> None:
+        """Begin again if the file is no longer what was written."""
+        size = self._size()
+        if size is None:
+            self._file.close()
+            _check_free(self.path)
+            self._begin()
+            self._tell('was moved or deleted; the recording goes on in a new file')
+        elif size < self._written:
+            self._file.truncate(0)
+            self._put_head()
+            self._tell('was cut; the recording begins again in it')
+
+    def _size(self) -> int | None:
+        """Return the size of our file; None if the path leads to another file, or to none."""
+        try:
+            status = self.path.stat()
+        except FileNotFoundError:
+            return None
+        return status.st_size if (status.st_dev, status.st_ino) == self._identity else None
+
     def _begin(self) -> None:
         if self.path.exists():
-            self.path.replace(f'{self.path}.1')
+            if self.path.stat().st_size:
+                _check_free(self._older)
+                self.path.replace(self._older)
+            else:
+                self.path.unlink()
         self.path.touch(0o640)  # not for every user: it holds the values of a plant
-        self._file = self.path.open('wb', buffering=0)
+        self._file = self.path.open('ab', buffering=0)
+        status = self.path.stat()
+        self._identity = status.st_dev, status.st_ino
         with suppress(OSError):  # not every network file system has locks
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        self._put_head()
+
+    def _put_head(self) -> None:
         self._written = 0
         self._put('\n'.join([_FIRST_LINE, *(
             setting_line(name, value) for name, value in self._settings.items())]))
@@ -156,6 +191,14 @@ class CaptureWriter:
             self._file.truncate(self._written)  # half a line would mean other bytes
             raise
         self._written += len(line)
+
+
+def _check_free(place: Path) -> None:
+    """Raise OSError if there is a file that a capture must not replace."""
+    if place.exists() and not may_replace(place, _MAGIC.encode()):
+        raise OSError(errno.EEXIST, 'exists and is not a capture; give another name', str(place))
+    if place.exists() and _is_locked(place):
+        raise OSError(errno.EBUSY, 'is being written by another; give another name', str(place))
 
 
 def setting_line(name: str, value: str) -> str:

@@ -239,6 +239,18 @@ def test_end_waits_until_results_and_diagnostics_have_arrived(
     assert 'trace' not in {thread.name for thread in threading.enumerate()}
 
 
+def test_trace_that_is_moved_goes_on_and_is_told(
+        make_bench: Benches, tmp_path: Path, capfd: Output) -> None:
+    trace = tmp_path / 'line.cap'
+    bench = make_bench(SPEED, parameters=(f'trace_file:={trace}',))
+    bench.ros.until(trace.exists, 'the capture')
+    trace.rename(tmp_path / 'moved.cap')
+    bench.ros.until(trace.exists, 'the next capture')
+    assert bench.end() == 0
+    assert re.search(rf'\[INFO\] .*: trace_file: {trace} was moved or deleted; the recording goes '
+                     'on in a new file', capfd.readouterr().err)
+
+
 # Maps with faults
 
 

@@ -14,6 +14,7 @@
 
 """Captures: written, read again, limited, refused."""
 
+from collections.abc import Callable
 import os
 from pathlib import Path
 import stat
@@ -138,6 +139,79 @@ def test_other_files_are_left_alone(tmp_path: Path) -> None:
             capture.CaptureWriter(place)
     with pytest.raises(FileNotFoundError):
         capture.CaptureWriter(tmp_path / 'nowhere' / 'x')
+
+
+def rotated_by_copy(path: Path, to: Path) -> None:
+    """Do what logrotate does with ``copytruncate``."""
+    to.write_bytes(path.read_bytes())
+    os.truncate(path, 0)
+
+
+def rotated_by_move(path: Path, to: Path) -> None:
+    """Do what logrotate does with ``create``."""
+    path.rename(to)
+    path.touch()
+
+
+@pytest.mark.parametrize(('take_away', 'told'), [
+    (rotated_by_copy, ['was cut; the recording begins again in it']),
+    (lambda path, to: os.truncate(path, 30), ['was cut; the recording begins again in it']),
+    (rotated_by_move, ['was moved or deleted; the recording goes on in a new file']),
+    (lambda path, to: path.rename(to), ['was moved or deleted; the recording goes on in a new '
+                                        'file']),
+    (lambda path, to: path.unlink(), ['was moved or deleted; the recording goes on in a new '
+                                      'file'])])
+def test_capture_that_others_take_away_begins_again(
+        tmp_path: Path, take_away: Callable[[Path, Path], None], told: list[str]) -> None:
+    path, copy = tmp_path / 'x', tmp_path / 'x.1'
+    news: list[str] = []
+    writer = capture.CaptureWriter(path, settings={'baud': '19200'}, tell=news.append)
+    before, *after = CHUNKS
+    writer.write(before)
+    for _ in range(2):
+        take_away(path, copy)
+        for chunk in after:
+            writer.write(chunk)
+        assert (news, chunks_of(path)) == (told, after)
+        assert lines_of(path)[:2] == ['# abdf1_ros capture 1', '# baud: 19200']
+        assert stat.S_IMODE(path.stat().st_mode) == 0o640
+        news.clear()
+        if copy.exists():
+            assert chunks_of(copy) == [before]
+            copy.unlink()
+        before, after = CHUNKS[2], [CHUNKS[2]]
+        writer.close()
+        writer = capture.CaptureWriter(path, settings={'baud': '19200'}, tell=news.append)
+        writer.write(before)  # a start after it finds captures only
+        copy.unlink(missing_ok=True)
+    writer.close()
+
+
+def test_what_others_have_put_in_the_place_of_a_capture_stays(tmp_path: Path) -> None:
+    path = tmp_path / 'x'
+    writer = capture.CaptureWriter(path)
+    writer.write(CHUNKS[0])
+    path.rename(tmp_path / 'y')
+    path.write_text('important', encoding='ascii')
+    with pytest.raises(OSError, match='exists and is not a capture'):
+        writer.write(CHUNKS[1])
+    writer.close()
+    assert path.read_text(encoding='ascii') == 'important'
+    assert chunks_of(tmp_path / 'y') == CHUNKS[:1]
+    path.rename(tmp_path / 'z.1')
+    writer = capture.CaptureWriter(tmp_path / 'y', 100)
+    (tmp_path / 'z.1').replace(tmp_path / 'y.1')
+    with pytest.raises(OSError, match=r'exists and is not a capture.*y\.1'):
+        writer.write(capture.Chunk(0.0, capture.Direction.IN, bytes(20)))
+    writer.close()
+    assert (tmp_path / 'y.1').read_text(encoding='ascii') == 'important'
+
+
+def test_empty_file_does_not_replace_a_rotated_capture(tmp_path: Path) -> None:
+    (tmp_path / 'x.1').write_text(TEXT, encoding='ascii')
+    (tmp_path / 'x').touch()
+    capture.CaptureWriter(tmp_path / 'x').close()
+    assert (tmp_path / 'x.1').read_text(encoding='ascii') == TEXT
 
 
 @for_all('line', [

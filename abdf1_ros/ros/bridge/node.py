@@ -147,7 +147,8 @@ class BridgeNode(AnsweringNode):
             self._opener.trace(
                 parameters.trace_file, parameters.trace_limit * 1e6,
                 _head(self.session.configuration.network),
-                lambda text: self.get_logger().error(f'trace_file: {printable(text)}'))
+                lambda text: self.get_logger().error(f'trace_file: {printable(text)}'),
+                lambda text: self.session.events.notes.info('trace_file', f'trace_file: {text}'))
         # First, because ~/reload starts guests, too, as soon as the link runs.
         if self.surroundings.is_offered:
             self.session.guests.start()
