@@ -351,29 +351,9 @@ class MasterLine:
 
     def answers(self, packet: Packet, command: Packet) -> bool:
         """Tell whether a message is the reply to ``command``; a gateway may fill in its DST."""
-        if packet.dst != command.src and command.dst in self.stations.routes \
-                and self._is_of_gateway(packet, command):
-            packet = packet._replace(dst=command.src)
-        return packet.answers(command)
-
-    def _is_of_gateway(self, packet: Packet, command: Packet) -> bool:
-        """
-        Tell whether a reply has the number of its gateway in place of ours (M 6-4).
-
-        The column Via has this number. On its other network the gateway may have another number,
-        which we do not know. We accept another number if two replies in a row have it, unless it
-        is the number of a station in our list.
-        """
-        if not packet._replace(dst=command.src).answers(command):
-            return False
-        gateway = self.stations.records[self.stations.routes[command.dst]]
-        if packet.dst == gateway.number:
-            return True
-        if packet.dst in self.stations:
-            return False
-        is_known = packet.dst == gateway.other_number
-        gateway.other_number = packet.dst
-        return is_known
+        gateway = self.stations.routes.get(command.dst)
+        return packet.answers(command) if gateway is None else \
+            self.stations.answers(packet, command, gateway)
 
     def complete(self, task: Task, reply: Packet, *, keeps_others_waiting: bool) -> None:
         """End a task with the reply to its command."""

@@ -409,7 +409,7 @@ class FullDuplexPeer(EqualNode):
         self._accounting.received(packet)
         key = packet.src, packet.tns
         entry = self._outstanding.get(key)
-        if entry is None or not packet.answers(entry.task.command):
+        if entry is None or not self._stations.answers(packet, entry.task.command, None):
             # for another node: our reply may follow with the same SRC, CMD and TNS
             if entry is not None:
                 self._accepted = None

@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 import math
 
-from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.packet import DIAGNOSTIC_REPLY, is_local_status, Packet
 from abdf1_ros.df1.probes import Asker, Probes
 
 MAX_STATION = 254
@@ -48,9 +48,8 @@ class Station:
     - ``local_status``: STS of the last reply if a gateway sent it for the station; 0 if the
       station replied itself.
     - ``has_gateway``: it is or was behind a gateway, which may hold commands; False if unknown.
+    - ``replies_to_us``: it has replied to our number, and no gateway did so for it.
     - ``returns``: how often the station has become active again since its last reply to a command.
-    - ``other_number``: for a gateway, the DST of its last reply with a DST that was neither our
-      number nor the gateway's.
     """
 
     number: int
@@ -67,8 +66,8 @@ class Station:
     unanswered: int = 0
     local_status: int = 0
     has_gateway: bool = False
+    replies_to_us: bool = False
     returns: int = 0
-    other_number: int | None = None
 
     @property
     def replies_in_time(self) -> bool:
@@ -138,6 +137,8 @@ class ActiveStationList:
         self._took = took
         self.records = _Records()
         self._stations: dict[int, Station] = {}
+        # By gateway: DST of the last reply that came neither to our number nor to the gateway's.
+        self._others: dict[int | None, int] = {}
         self._on_change, self._on_gateway = on_change, on_gateway
         self.routes = {station: gateway for station, gateway in (routes or {}).items()
                        if station != gateway}
@@ -194,6 +195,35 @@ class ActiveStationList:
                 station.active, station.silent_since = True, None
                 station.returns += 1
                 self._tell(station)
+
+    def answers(self, reply: Packet, command: Packet, gateway: int | None) -> bool:
+        """
+        Tell whether a message is the reply to a ``command`` that may have passed a ``gateway``.
+
+        A gateway may put its own number in place of ours into a command. Then the reply comes to
+        that number (M 6-4). Usually this is the number of the gateway on our line. None stands for
+        the far end of a full-duplex line, which has no such number. We accept another number if
+        two replies in a row have it. The exceptions are a number in our list, and any number if
+        the station has replied to ours. The gateway itself may reply to ours at any time.
+        """
+        station = self.records[command.dst]
+        if reply.answers(command):
+            station.replies_to_us |= not (
+                reply.cmd == DIAGNOSTIC_REPLY or is_local_status(reply.sts))
+            return True
+        if not reply._replace(dst=command.src).answers(command):
+            return False
+        if station.replies_to_us or reply.dst == gateway:
+            return reply.dst == gateway
+        self.gateway_replied(reply.src)
+        is_known = reply.dst == self._others.get(gateway)
+        self._others[gateway] = reply.dst
+        return is_known and reply.dst not in self
+
+    def other_number(self, number: int) -> int | None:
+        """Return to which number the replies of a station come if not to ours, otherwise None."""
+        is_other = not self.records[number].replies_to_us
+        return self._others.get(self.routes.get(number)) if is_other else None
 
     def gateway_replied(self, number: int) -> None:
         """Record that a gateway has replied for a station."""

@@ -301,6 +301,41 @@ def test_station_that_takes_commands_and_never_replies_is_told(bench: Bench) -> 
     assert bench.says('link')[0] == ERROR
 
 
+def test_acknowledgement_without_a_reply_is_told_as_what_it_is(make_bench: Benches) -> None:
+    bench = make_bench('speed,Read,N7:0,1,SLC,1000', mode='Peer')
+    stations = bench.driver.stations
+    told = 'commands to station 1 are acknowledged, and no reply comes: is the number right? '
+    stations[1].unanswered = 1  # may be late once
+    assert bench.says('link')[0] == OK
+    stations[1].unanswered = 2
+    assert bench.says('station 1')[1].startswith(f'WARN: {told}')
+    level, text = bench.says('link')
+    assert level == ERROR
+    assert text.startswith(
+        f'ERROR: port open, but none of 1 stations replies to commands; {told}')
+    stations[1].replies = 1  # it is there
+    assert told not in bench.says('link')[1] + bench.says('station 1')[1]
+
+
+def test_number_to_which_a_gateway_replies_is_told_also_where_all_works(
+        make_bench: Benches) -> None:
+    bench = make_bench('speed,Read,N7:0,1,SLC,1000', 'load,Read,N7:0,2,SLC,1000', mode='Peer')
+    watches = watches_of(bench.diagnostics.line, PORT, bench.seen, [], lambda now: [],
+                         lambda now: [], lambda now: '')
+    command = Packet(1, 5, 0x0F, 0, 1, b'')
+    stations = bench.driver.stations
+    assert not stations.answers(command.reply()._replace(dst=8), command, None)
+    for _ in range(2):
+        stations.heard(1, NOW)
+    told = ('replies come to number 8, not to ours: a gateway such as the 1770-KF2 and KF3 '
+            'replies to its own number. Make it our Station: 8 in net.csv, or --own-station 8 of '
+            '"plc"')
+    assert bench.says('link') == (WARN, f'WARN: port open; {told}')
+    assert bench.says('station 1')[0] == OK
+    assert [[news.text for watch in watches for news in watch.look(NOW)] for _ in range(2)] == [
+        [told], []]
+
+
 @pytest.mark.parametrize('polling', ['Message', 'Standard'])
 def test_plc_that_acknowledges_and_has_nothing_to_say_for_ever_takes_in_silence(
         polling: str) -> None:

@@ -97,6 +97,7 @@ class OddDevice:
         self.executes_diagnostics = False  # for all nodes
         self.waits_for_poll = True  # with its replies, in half duplex
         self.knows_commands = True
+        self.replies_to: int | None = None  # in place of the SRC of a command
         self.words: dict[tuple[int, int, int], int] = {}
         self.takes: Callable[[bytes], Answer] = lambda data: Answer.ACK
         self.seconds: Callable[[bytes], float] = lambda data: 0.0
@@ -230,6 +231,8 @@ class OddDevice:
                 self.executes_diagnostics and data[2] == _ECHO):
             status, result = self.answer(data)
         reply = _reply_to(data, status) + result
+        if self.replies_to is not None and not (self.executes_diagnostics and data[2] == _ECHO):
+            reply = bytes((self.replies_to,)) + reply[1:]
         if seconds := self.seconds(data):
             self._send_after(seconds, reply)
         else:

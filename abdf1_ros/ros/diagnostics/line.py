@@ -24,6 +24,7 @@ from abdf1_ros.df1.echo import COMES_BACK
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
+from abdf1_ros.driver.evidence import evidence_of
 from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.ports.link_thread import LinkThread
@@ -87,6 +88,17 @@ class LineView:
         driver = self.driver
         return (driver.network.line_mode.has_one_plc and driver.counters.naks_received > 0
                 and not driver.counters.acks_received)
+
+    def evidence(self) -> list[str]:
+        """Return what the line has shown of stations whose replies do not come, each text once."""
+        found = map(self.evidence_of, self.driver.stations)
+        return [*dict.fromkeys(filter(None, found))]
+
+    def evidence_of(self, station: Station) -> str:
+        stations, number = self.driver.stations, station.number
+        if not takes_in_silence(station) and stations.other_number(number) is None:
+            return ''
+        return str(evidence_of(self.driver.network.line_mode, stations, number))
 
     def wrong_types(self) -> list[str]:
         """Return a text for each PLC whose family or processor differs from the map."""

@@ -86,15 +86,19 @@ class LinkStatus:
                 ', or the device server keeps this connection waiting' if '://' in self.hardware_id
                 else '')
         silent = sum(map(takes_in_silence, stations))
+        shown = ''.join(f'; {text}' for text in self._line.evidence()[:1])
         if silent and silent == active:
-            return ERROR, f'port open, but none of {total} stations replies to commands'
+            return ERROR, f'port open, but none of {total} stations replies to commands{shown}'
         if active < total:
             return WARN, f'port open, {total - active} of {total} stations do not answer'
         if unreached := sum(station.local_status != 0 for station in stations):
             return WARN if unreached < total else ERROR, (
                 f'port open, {unreached} of {total} stations are not reached by their gateway')
         if silent:
-            return WARN, f'port open, {silent} of {total} stations take commands and do not reply'
+            return WARN, (
+                f'port open, {silent} of {total} stations take commands and do not reply{shown}')
+        if shown:
+            return WARN, f'port open{shown}'
         heard = sum(station.last_heard is not None for station in stations)
         if refused := self._line.driver.refused.lately(now):
             return WARN, f'port open, but the bridge has refused a command of {refused[-1]}'

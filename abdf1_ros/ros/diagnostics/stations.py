@@ -85,7 +85,8 @@ class StationStatus:
             return WARN, f'commands do not get to station {station.number}: ' \
                          f'{status_text(station.local_status)}'
         if takes_in_silence(station):
-            return WARN, f'station {station.number} takes commands, but does not reply in time'
+            return WARN, line.evidence_of(station) or (
+                f'station {station.number} takes commands, but does not reply in time')
         if station.last_heard is None:
             return OK, f'station {station.number} not heard yet'
         why = processor_fault(line.driver.checks.known(station.number).identity)

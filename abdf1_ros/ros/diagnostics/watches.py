@@ -110,6 +110,7 @@ def watches_of(line: LineView, port: str, seen: Seen, guests: Sequence[GuestLine
             f'guest {guest.guest.name}: {guest.fault}' for guest in guests if guest.fault]),
         NewFaults(WARN, 'commands to us', lambda now: [
             f'refused a command of {text}' for text in line.driver.refused.lately(now)]),
+        NewFaults(WARN, 'replies', lambda now: line.evidence()),
         NewFaults(WARN, 'types of PLCs', lambda now: line.wrong_types()),
         DeafStations(line),
         NewFaults(ERROR, 'line', fault)]

@@ -1,0 +1,66 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a line has shown of a station whose replies do not come, for all who tell it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from abdf1_ros.df1.mode import LineMode
+from abdf1_ros.df1.stations import ActiveStationList
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """
+    What a line has shown of a station; as text: the cause and the cure, empty for none.
+
+    - ``gateway``: the number of its gateway, None if the station is on the line itself.
+    - ``other_number``: the number to which its replies come in place of ours, None for ours.
+    - ``is_only_acknowledged``: the station has never replied. Its commands were acknowledged, but
+      the ACK was not its own: it came from a gateway, or from the far end of a full-duplex line.
+    """
+
+    station: int
+    gateway: int | None = None
+    other_number: int | None = None
+    is_only_acknowledged: bool = False
+
+    def __str__(self) -> str:
+        """Return the cause and the cure."""
+        other = self.other_number
+        if other is not None and self.gateway is None:
+            return (f'replies come to number {other}, not to ours: a gateway such as the 1770-KF2 '
+                    f'and KF3 replies to its own number. Make it our Station: {other} in net.csv, '
+                    f'or --own-station {other} of "plc"')
+        if not self.is_only_acknowledged:
+            return ''
+        if self.gateway is not None:
+            return (f'gateway {self.gateway} acknowledges commands to station {self.station}, and '
+                    f'no reply comes: is the number right? "plc scan 0-63 --via {self.gateway}" '
+                    'shows which stations reply')
+        return (f'commands to station {self.station} are acknowledged, and no reply comes: is the '
+                'number right? An SLC with passthru, or a gateway, acknowledges commands for all '
+                'stations; "plc scan 0-63" shows which stations reply')
+
+
+def evidence_of(mode: LineMode, stations: ActiveStationList, number: int) -> Evidence:
+    """Return what the line has shown of a station."""
+    station, via = stations.records[number], stations.via(number)
+    gateway = None if via == number else via
+    proves_nothing = mode.waits_for_acks and (mode.has_one_plc or gateway is not None)
+    return Evidence(
+        number, gateway, stations.other_number(number),
+        proves_nothing and station.unanswered > 0 and not station.replies)
