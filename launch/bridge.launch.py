@@ -49,6 +49,10 @@ from launch_ros.utilities import make_namespace_absolute, prefix_namespace
 # Exit status for faulty files or parameters, which do not become better by trying again.
 FAULTY = 2
 RESPAWN_DELAY = 2.0
+
+# Seconds for the end after Ctrl-C; launch kills the process some seconds after them.
+LONGEST_END = '10'
+
 YES, NO = ('true', 'True'), ('false', 'False')
 
 OWN = ('params_file', 'namespace', 'name', 'log_level', 'respawn')
@@ -108,6 +112,7 @@ def bridge(arguments: dict[str, str], restore: OpaqueFunction) -> Node:
         ros_arguments=['--log-level', f'{logger(arguments)}:={arguments["log_level"]}'],
         output='screen',
         emulate_tty=True,
+        sigterm_timeout=LONGEST_END,
         on_exit=started_again,
     )
 

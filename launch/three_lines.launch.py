@@ -47,6 +47,9 @@ LINES = ('press', 'paint', 'packing')
 # Exit status for faulty files or parameters, which do not become better by trying again.
 FAULTY = 2
 
+# Seconds for the end after Ctrl-C; launch kills the process some seconds after them.
+LONGEST_END = '10'
+
 
 def line(namespace: str) -> GroupAction:
     """Return one bridge, in a scope of its own: its arguments do not reach the next bridge."""
@@ -78,7 +81,7 @@ def all_lines(restore: OpaqueFunction) -> Node:
 
     sections = ParameterFile(LaunchConfiguration('lines_file'), allow_substs=True)
     return Node(package='abdf1_ros', executable='lines', output='screen', parameters=[sections],
-                on_exit=started_again)
+                sigterm_timeout=LONGEST_END, on_exit=started_again)
 
 
 def refuse_unknown(context: LaunchContext) -> None:

@@ -32,7 +32,7 @@ from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.job_tasks import LineTime
 from abdf1_ros.driver.write import Outcome, Write
 from abdf1_ros.errors import LinkError, RemoteError
-from abdf1_ros.pccc.extent import Extent
+from abdf1_ros.pccc.extent import Extent, OUR_TABLE
 from abdf1_ros.plan.planner import Block
 from abdf1_ros.settings.mapping import Mapping
 
@@ -240,13 +240,15 @@ class WriteRecord:
 
     A write without an answer may land for ``settle_time`` s more, as a gateway may hold it.
     ``stations`` knows which stations are behind a gateway.
-    ``readers`` get the words of good reads.
+    ``readers`` get the words of good reads. ``has_sent`` is set when a write to a PLC has begun,
+    also before ~/reload.
     """
 
     def __init__(self, line: LineTime, settle_time: float, stations: ActiveStationList) -> None:
         self.line = line
         self._settle_time = settle_time
         self._stations = stations
+        self.has_sent = False
         self._opened_until = -math.inf
         self._under_way: list[Claim] = []
         self._late: list[Claim] = []  # have ended, and may land; the last one of each _key_of
@@ -279,6 +281,7 @@ class WriteRecord:
 
     def take_over(self, before: WriteRecord) -> None:
         """Take the writes of the record before that may still land, also of rows that are gone."""
+        self.has_sent |= before.has_sent
         self._late = [claim for claim in before._late if claim.lands_until > before.line.now]
         for claim in self._late:
             for row, words in self._words.items():
@@ -311,6 +314,7 @@ class WriteRecord:
               write: Write | None = None) -> Claim:
         """Record that a write has the line, until it has ``ended``."""
         claim = Claim(station, extents, write, begun=self.line.now)
+        self.has_sent |= station != OUR_TABLE
         self._under_way.append(claim)
         for listener in self._listeners:
             listener.write_begins(claim)

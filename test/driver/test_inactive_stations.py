@@ -68,7 +68,7 @@ def test_end_writes_once_to_a_plc_that_is_not_heard(
     death.line.wake(death.driver.machine)
     death.run_until(lambda: interlocks.is_over or death.clock() > dies_after + 6.0)
     assert (death.word(7), death.word(10)) == (SAFE, 0)
-    assert sorted(interlocks.unconfirmed()) == ['beat', 'speed']
+    assert sorted(interlocks.unconfirmed(0.0)) == ['beat', 'speed']
 
 
 def test_0_and_fallback_go_out_without_a_poll_once_and_a_read_after_one() -> None:

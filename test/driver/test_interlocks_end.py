@@ -14,13 +14,17 @@
 
 """The orderly end of a bridge on a virtual line: rule 5 of docs/heartbeats.md."""
 
+from dataclasses import replace
 import math
 
 from abdf1_ros.df1.packet import Packet
+from abdf1_ros.driver.interlocks.queue import Interlocks
 from abdf1_ros.driver.write import Write
 from abdf1_ros.driver.writes.under_way import WriteJob
 from abdf1_ros.settings.heartbeats import Fallback, LAST_ANSWER
+from abdf1_ros.settings.mapping import Mapping
 import pytest
+from support.driver_bench import store
 from support.interlocks import beat_row, Cell, END, end, FALLBACK, Line, speed_row
 from support.mappings import make_mapping
 
@@ -54,7 +58,7 @@ def test_rule_5_orderly_end_is_0_then_the_fallbacks() -> None:
     assert [(name, value) for when, name, value in cell.writes if when >= since] == [
         ('N10:0', 0), ('N7:0', 7)]
     assert driver.interlocks.is_over
-    assert driver.interlocks.unconfirmed() == []
+    assert driver.interlocks.unconfirmed(cell.now) == []
     assert cell.results()[-2:] == ['not written: refused: this node ends', END]
 
 
@@ -82,7 +86,7 @@ def test_rule_5_message_does_not_outlive_the_end(moment: str) -> None:
         assert cell.word('N7:0') == 7
     end(cell, 0.3)
     assert (cell.word('N10:0'), cell.word('N7:0')) == (0, 7)
-    assert driver.interlocks.unconfirmed() == []
+    assert driver.interlocks.unconfirmed(cell.now) == []
 
 
 @pytest.mark.parametrize('event', ['end', 'RUN', 'port'])
@@ -179,7 +183,7 @@ def test_rule_5_end_asks_a_silent_plc_too_where_another_has_its_own_rows() -> No
     line.driver.interlocks.wind_down()
     line.line.wake(line.driver.machine)
     line.run_until(lambda: line.driver.interlocks.is_over, 2.0)
-    assert line.driver.interlocks.unconfirmed() == ['speed1']
+    assert line.driver.interlocks.unconfirmed(line.clock()) == ['speed1']
 
 
 @pytest.mark.parametrize(('ends', 'is_silent', 'answer_within'), [
@@ -209,11 +213,119 @@ def test_rule_5_silent_plc_is_not_due_at_the_end_while_another_has_not_answered(
 
 def test_rule_5_what_was_not_confirmed_at_the_end_is_named() -> None:
     cell = Cell(beat_row(), speed_row(), start=False)
-    assert cell.bench.driver.interlocks.unconfirmed() == ['beat']
+    assert cell.bench.driver.interlocks.unconfirmed(cell.now) == ['beat', 'speed']
     cell.bench.open(run=1.0)
     cell.refused = {'N10:0'}
     cell.bench.driver.interlocks.wind_down()
     cell.bench.line.wake(cell.bench.driver.machine)
     cell.run(2.0)
     assert not cell.bench.driver.interlocks.is_over
-    assert cell.bench.driver.interlocks.unconfirmed() == ['beat']
+    assert cell.bench.driver.interlocks.unconfirmed(cell.now) == ['beat']
+
+
+def begin_end(cell: Cell) -> Interlocks:
+    """Begin an orderly end."""
+    driver = cell.bench.driver
+    driver.interlocks.wind_down()
+    cell.bench.line.wake(driver.machine)
+    return driver.interlocks
+
+
+@pytest.mark.parametrize('beats', [(beat_row(),), ()])
+@pytest.mark.parametrize('is_lost_first', [True, False])
+def test_rule_5_end_waits_for_a_lost_port_and_writes_what_it_can_when_it_is_back(
+        beats: tuple[Mapping, ...], is_lost_first: bool) -> None:
+    speed, other = speed_row(Fallback((7,), 20_000)), speed_row(address='N10:5', tag='other')
+    cell = Cell(*beats, speed, other, run=1.95)
+    cell.publish(speed, 42, run=0.2)
+    if is_lost_first:
+        cell.bench.lose_port()
+        interlocks = begin_end(cell)
+    else:
+        interlocks = begin_end(cell)
+        cell.bench.run_until(lambda: any(row.is_under_way for row in interlocks.fallbacks))
+        cell.bench.lose_port()
+    tags = ['beat', 'speed'] if is_lost_first and beats else ['speed']
+    assert interlocks.unconfirmed(cell.now) == tags
+    assert interlocks.has_to_wait(is_open=False)
+    cell.run(1.0)
+    store(cell.plc, 'N10:5', [99])  # another program has the adapter for a moment
+    cell.bench.open()
+    since = cell.now
+    while interlocks.has_to_wait(is_open=True):
+        assert cell.now < since + 1.0
+        cell.run(0.005)
+    assert (cell.word('N10:0'), cell.word('N7:0'), cell.word('N10:5')) == (0, 7, 7)
+    assert (interlocks.unconfirmed(cell.now), interlocks.not_repeated()) == ([], [])
+    assert not interlocks.has_to_wait(is_open=False)
+
+
+def test_rule_5_end_does_not_wait_for_a_lost_port_where_no_command_of_ours_may_stand() -> None:
+    speed, other = speed_row(Fallback((7,), 20_000)), speed_row(tag='other', address='N10:5')
+    cell = Cell(speed, other, start=False)
+    interlocks = cell.bench.driver.interlocks
+    interlocks.wind_down()
+    assert interlocks.unconfirmed(0.0) == ['speed', 'other']
+    assert not interlocks.has_to_wait(is_open=False)  # nothing has gone out
+    interlocks.resume()
+    cell.bench.open(run=1.0)
+    cell.bench.lose_port()
+    interlocks.wind_down()
+    assert not interlocks.has_to_wait(is_open=False)  # all are safe
+    assert (interlocks.unconfirmed(cell.now), interlocks.not_repeated()) == (
+        [], ['speed', 'other'])
+    interlocks.resume()
+    cell.bench.open(run=1.0)
+    cell.publish(speed, 42, run=0.1)
+    cell.bench.lose_port()
+    interlocks.wind_down()
+    assert interlocks.has_to_wait(is_open=False)
+    assert not interlocks.has_to_wait(is_open=False, is_meant=lambda row: row is other)
+    cell.bench.driver.take_over(cell.bench.driver)
+    after = Cell(speed, other, start=False).bench.driver  # of new files, on the lost port
+    assert not after.interlocks.has_to_wait(is_open=False)
+    after.take_over(cell.bench.driver)
+    assert after.interlocks.has_to_wait(is_open=False)
+
+
+def test_rule_5_what_stands_is_written_once_more_at_the_end_after_all_else() -> None:
+    rows = [speed_row(tag=f'speed{number}', address=f'N7:{number}') for number in range(3)]
+    beat, beats = beat_row(requires=('speed0',), timeout=60_000), beat_row(address='N10:1')
+    cell = Cell(beat, replace(beats, tag='beats'), *rows, run=1.95)
+    cell.publish(rows[1], 42, run=0.1)
+    store(cell.plc, 'N7:0', [98])  # by other programs, and not read since
+    store(cell.plc, 'N7:2', [99])
+    store(cell.plc, 'N10:0', [5000])
+    asked, serve = list[int](), cell.plc.serve
+
+    def keep(command: Packet) -> Packet:
+        if command.data[:1] == b'\x67':
+            asked.append(100 * command.data[6] + command.data[7])
+        return serve(command)
+
+    cell.plc.serve = keep  # type: ignore[method-assign]
+    end(cell)
+    assert [cell.word(f'N7:{number}') for number in range(3)] == [7, 7, 7]
+    assert (cell.word('N10:0'), cell.word('N10:1')) == (0, 0)
+    assert asked == [1001, 701, 1000, 700, 702]
+    assert cell.results()[-1] == END and cell.results().count(END) == 1
+
+
+@pytest.mark.parametrize('fault', ['refused', 'silent', 'no answer'])
+def test_rule_5_what_stands_has_one_try_and_is_named_where_it_is_not_written_again(
+        fault: str) -> None:
+    cell = Cell(beat_row(requires=('speed',), timeout=300), speed_row(), run=1.95)
+    if fault == 'refused':
+        cell.refused = {'N7:0', 'N10:0'}
+    elif fault == 'silent':
+        cell.plc.faults.silent = True
+        cell.bench.driver.stations.lost(1, cell.now)
+    else:
+        cell.is_late = True
+    interlocks, since = begin_end(cell), cell.now
+    while interlocks.has_to_wait(is_open=True):
+        assert cell.now < since + 2.0
+        cell.run(0.005)
+    assert (interlocks.unconfirmed(cell.now), interlocks.not_repeated()) == (
+        [], ['beat', 'speed'])
+    assert cell.refusals == (2 if fault == 'refused' else 0)

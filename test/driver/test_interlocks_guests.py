@@ -82,7 +82,7 @@ def test_rule_5_what_may_still_land_after_the_end_is_named() -> None:
     cell.ask('N7:0', 99)
     cell.run(0.02)
     end(cell)
-    unconfirmed, = cell.bench.driver.interlocks.unconfirmed()
+    unconfirmed, = cell.bench.driver.interlocks.unconfirmed(cell.now)
     what, _, left = unconfirmed.partition(' for ')
     assert what == 'speed (a gateway may hold a write to it'
     assert 0.0 < float(left.removesuffix(' s)')) <= 20.0

@@ -297,7 +297,7 @@ def test_rule_5_orderly_end_has_the_time_that_is_printed() -> None:
     bench.line.wake(bench.driver.machine)
     bench.run_until(lambda: interlocks.is_over, LONGEST_END)
     assert bench.line.now - begun < end
-    assert interlocks.unconfirmed() == []
+    assert interlocks.unconfirmed(bench.clock()) == []
     assert [stored(plc, 'N7:0', 5) for plc in plcs] == [bytes([7, 0] * 5)] * 5
 
 

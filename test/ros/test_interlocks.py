@@ -35,6 +35,8 @@ from std_msgs.msg import Int16MultiArray
 from std_srvs.srv import SetBool, Trigger
 from support import ros
 from support.commands import Output, running_simulator
+from support.fault_box import FaultBox
+from support.ptys import PATIENCE
 from support.rungs import PageLadder
 
 NET = 'NAK_Retries,ENQ_Retries,Cmd_Timeout,Baud,Timeout\n1,1,500,115200,100\n'
@@ -179,6 +181,34 @@ def test_rule_5_port_that_is_left_to_others_is_left_with_zero(
     monkeypatch.setattr('abdf1_ros.ros.bridge.node.HAND_OVER', 0.1)
     assert cell.call(SetBool, 'polling', SetBool.Request(data=False)).success
     assert 'the port is closed before the PLC has confirmed: beat' in capfd.readouterr().err
+
+
+@pytest.mark.parametrize('is_end', [True, False])
+@pytest.mark.parametrize('is_back', [True, False])
+def test_rule_5_end_waits_for_a_port_that_was_lost_and_names_what_may_stand(
+        is_back: bool, is_end: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+        capfd: Output) -> None:
+    name = 'LONGEST_END' if is_end else 'HAND_OVER'
+    monkeypatch.setattr(f'abdf1_ros.ros.bridge.node.{name}', PATIENCE if is_back else 0.1)
+    cell = Cell(tmp_path, f'port:="{tmp_path / "line"}"')
+    cell.map.write_text(MAP.replace(',400,', ',60000,'), encoding='utf-8')
+    with FaultBox(Path(cell.plcs.port), tmp_path / 'line') as box, cell:
+        cell.until_counting()
+        cell.until_word(cell.ros.publisher(Int16MultiArray, '/abdf1/write/speed'), 42)
+        box.unplug()
+        cell.until(lambda: not cell.node.session.driver.is_online, 'the lost port')
+        back = threading.Timer(0.2, box.plug)
+        if is_back:
+            back.start()
+        if is_end:
+            cell.end()
+        else:
+            assert cell.call(SetBool, 'polling', SetBool.Request(data=False)).success
+        assert cell.word('N10:1') == (7 if is_back else 42)
+        assert (cell.word('N10:0') == 0) is is_back
+    what = 'ends' if is_end else 'the port is closed'
+    said = capfd.readouterr().err
+    assert (f'{what} before the PLC has confirmed: beat, speed' in said) is not is_back
 
 
 @pytest.mark.parametrize(('made', 'is_end', 'rows'), [

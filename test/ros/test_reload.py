@@ -28,12 +28,14 @@ from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.ros.bridge.guests import GuestPlaces
-from abdf1_ros.ros.bridge.reload import changes, refuse_harm
+from abdf1_ros.ros.bridge.reload import changes, refuse_harm, rows_left_behind
 from abdf1_ros.ros.bridge.session import BridgeSession
 from abdf1_ros.ros.diagnostics.line import LineView
 from abdf1_ros.ros.parameters.declared import Configuration, Parameters
 from abdf1_ros.ros.parameters.file_watch import FileWatch
 from abdf1_ros.ros.parameters.shown import ShownFiles
+from abdf1_ros.settings.heartbeats import Fallback
+from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.rows import Rows
 import pytest
@@ -320,7 +322,7 @@ def test_line_is_handed_over_in_order(bench: Bench, monkeypatch: pytest.MonkeyPa
 
     for owner, name, text in (
             (BridgeSession, 'begin_end', 'tell the PLCs'),
-            (BridgeSession, 'wait_for_plcs', 'wait for them'),
+            (BridgeSession, 'tell_unconfirmed', 'wait for them'),
             (BridgeSession, '__init__', 'make the new'), (LineView, 'attach', 'know the port'),
             (LinkThread, 'exchange', 'exchange'),
             (BridgeSession, 'end', 'end the old'), (BridgeSession, 'begin', 'begin the new'),
@@ -534,6 +536,24 @@ def test_other_name_of_the_same_device_is_not_tried(tmp_path: Path) -> None:
     link = tmp_path / 'plc'
     link.symlink_to('/dev/null')
     assert refusal(configured(ROW, port='/dev/null'), configured(ROW, port=str(link))) == ('', [])
+
+
+def test_rule_5_rows_are_left_behind_whose_words_have_no_or_another_safe_value() -> None:
+    speed, other = (make_mapping(f'N7:{number}', 'Write', tag=tag, fallback=Fallback((7,), 500))
+                    for number, tag in enumerate(('speed', 'other')))
+    beat = make_mapping('N10:0', 'Heartbeat', tag='beat', period=500)
+    before = configured(speed, other, beat, ROW)
+
+    def left(*after: Mapping) -> list[str]:
+        return sorted(row.tag for row in rows_left_behind(before, configured(*after)))
+
+    longer = replace(speed, tag='renamed', topic='renamed', fallback=Fallback((7,), 900))
+    assert left(longer, other, replace(beat, period=900)) == []
+    assert left(other) == ['beat', 'speed']
+    for changed in (replace(speed, fallback=Fallback((8,), 500)), replace(speed, fallback=None),
+                    make_mapping('N7:5', 'Write', fallback=Fallback((7,), 500)),
+                    replace(speed, station=2)):
+        assert left(changed, other, beat) == ['speed']
 
 
 def test_changes_are_named() -> None:

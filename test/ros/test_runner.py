@@ -26,7 +26,7 @@ import socket
 import threading
 import time
 from typing import Any
-from unittest.mock import Mock
+from unittest.mock import call, Mock
 
 from abdf1_ros.ros.bridge.last_writes import LAST_WRITES
 from abdf1_ros.ros.bridge.node import BridgeNode, end_together
@@ -39,6 +39,7 @@ import pytest
 from rclpy.executors import SingleThreadedExecutor, TimeoutException
 from rclpy.logging import get_logger
 from std_msgs.msg import Bool
+from support.cases import for_all
 from support.ros import EXAMPLE_FILES, Observer, PATIENCE, Process, ros_args
 
 
@@ -59,14 +60,17 @@ class Recorder:
     def begin_end(self) -> None:
         self._record('begin')
 
-    def wait_for_plcs(self, give_up: float, what: str) -> None:
+    def has_to_wait(self, is_meant: object) -> bool:
+        return False
+
+    def tell_unconfirmed(self, what: str) -> None:
         self._record(f'PLCs: {what}')
+
+    def close_line(self) -> None:
+        self._record('close line')
 
     def is_alive(self) -> bool:
         return True
-
-    def ask_to_stop(self) -> None:
-        self._record('ask link')
 
     def stop(self) -> None:
         self._record('stop link')
@@ -141,7 +145,7 @@ def test_failed_link_ends_all_by_the_clock_but_no_node_that_a_callback_uses(
 
 
 @pytest.mark.parametrize(('passed', 'words'), [(7.9, 3), (8.0, 0)])
-def test_all_plcs_are_told_before_a_link_stops_and_results_come_before_the_last_words(
+def test_plcs_are_told_before_their_link_stops_and_results_come_before_the_last_words(
         passed: float, words: int, monkeypatch: pytest.MonkeyPatch) -> None:
     calls: list[str] = []
     nodes: Any = [Recorder(calls) for _ in range(3)]
@@ -158,29 +162,61 @@ def test_all_plcs_are_told_before_a_link_stops_and_results_come_before_the_last_
     nodes[1].is_alive = lambda: False  # its link has failed
     end_together(nodes, 5.0)
     assert order(calls) == [
-        'begin', 'PLCs: ends', 'ask link', *('stop link', 'answer calls') * 3, '3 last writes',
-        *['last words'] * (words > 0)]
+        'begin', *('PLCs: ends', 'close line') * 2, *('stop link', 'answer calls') * 3,
+        '3 last writes', *['last words'] * (words > 0)]
     assert [calls.count(what) for what in ('begin', 'PLCs: ends', 'stop link', 'last words')] == [
         3 + 2, 2, 3, words]  # nodes, and sessions whose link is alive
     assert [node.limit for node in nodes] == 3 * [passed + 5.0 if words else 0.0]
 
 
-def test_plcs_of_all_lines_have_one_limit_and_a_dead_link_is_not_waited_for(
+def test_each_line_ends_when_its_own_plcs_have_confirmed_and_all_have_one_limit(
         monkeypatch: pytest.MonkeyPatch) -> None:
-    clock = Mock(monotonic=Mock(side_effect=range(100, 200)))
-    monkeypatch.setattr('abdf1_ros.ros.bridge.session.time', clock)
-    sessions: Any = [Mock(**{'begin_end.side_effect': clock.monotonic}) for _ in range(2)]
-    tell_plcs(sessions, 'ends', 6.0)
-    assert [each.wait_for_plcs.call_args.args for each in sessions] == 2 * [(106.0, 'ends')]
-    link = Mock(**{'is_alive.side_effect': [False, *4 * [True]]})
-    session: Any = Mock(is_waiting=True, _surroundings=Mock(link=link), **{
-        'driver.interlocks.is_over': False})
-    BridgeSession.wait_for_plcs(session, 199.0, 'ends')
-    clock.sleep.assert_not_called()
-    BridgeSession.wait_for_plcs(session, 106.0, 'ends')
-    link.state.is_open = False
-    BridgeSession.wait_for_plcs(session, 199.0, 'ends')
-    assert clock.sleep.call_count == 3  # after 103, 104 and 105
+    calls, now = list[str](), [100.0]
+
+    class Ending(Recorder):
+
+        def __init__(self, name: str, over: float) -> None:
+            super().__init__(calls)
+            self._name, self._over = name, over
+
+        def has_to_wait(self, is_meant: object) -> bool:
+            return now[0] < self._over
+
+        def _record(self, name: str) -> None:
+            if name != 'begin':
+                calls.append(f'{self._name}: {name} at {now[0]:g}')
+
+    def sleep(seconds: float) -> None:
+        now[0] += 1.0
+
+    monkeypatch.setattr('abdf1_ros.ros.bridge.session.time', Mock(
+        monotonic=lambda: now[0], sleep=sleep))
+    sessions: Any = [Ending(*each) for each in (('dead', 999.0), ('a', 0.0), ('b', 102.0))]
+    tell_plcs(sessions, 'ends', 6.0, closes_lines=True)
+    assert calls == [f'{name}: {what} at {when}' for name, when in (
+        ('a', 100), ('b', 102), ('dead', 106)) for what in ('PLCs: ends', 'close line')]
+
+
+@for_all(('is_alive', 'is_open', 'is_released', 'is_spare', 'waits'), [
+    (True, True, False, False, True), (True, True, False, True, True),
+    (False, True, False, False, False), (True, False, False, False, True),
+    (True, False, True, False, False), (True, False, False, True, False)])
+def test_end_waits_for_a_port_that_was_lost_unless_it_was_left_or_is_of_a_spare(
+        is_alive: bool, is_open: bool, is_released: bool, is_spare: bool, waits: bool) -> None:
+    link = Mock(is_released=is_released, **{'is_alive.return_value': is_alive})
+    link.state.is_open = is_open
+    surroundings = Mock(link=link)
+    session: Any = Mock(is_waiting=False, _surroundings=surroundings)
+    session.configuration.parameters.standby = is_spare
+    interlocks = session.driver.interlocks
+    interlocks.has_to_wait.return_value = True
+    assert BridgeSession.has_to_wait(session, bool) is waits
+    assert interlocks.has_to_wait.call_args_list == [call(is_open=is_open, is_meant=bool)] * waits
+    interlocks.unconfirmed.return_value, interlocks.not_repeated.return_value = ['beat'], ['speed']
+    BridgeSession.tell_unconfirmed(session, 'ends')
+    logger = surroundings.node.get_logger()
+    assert [logger.error.call_count, logger.warning.call_count] == (
+        [0, 0] if is_spare and not is_open else [1, 1])
 
 
 def test_spare_does_not_look_for_the_line_while_it_ends() -> None:

@@ -112,18 +112,19 @@ class FallbackRow:
         self.state = FallbackState.DUE
         self._next_try = self.due = now
 
-    def end(self, now: float) -> None:
-        """Make the fallback due at the end, unless the PLC surely holds it already."""
+    def end(self, now: float) -> bool:
+        """Make the fallback due at the end; return False if the PLC surely holds it already."""
         self.words.end(now)
         self.due = -math.inf
-        if not self.stands or self.words.lands_until > -math.inf:
+        is_due = not self.stands or self.words.lands_until > -math.inf
+        if is_due:
             self.make_due(FallbackCause.END, now)
+        return is_due
 
     @property
     def is_confirmed(self) -> bool:
-        """Tell whether the PLC has confirmed every write that was due."""
-        is_left = self.stands and self.words.again_at < math.inf
-        return self.cause is None and self.state is not FallbackState.OVERWRITTEN and not is_left
+        """Tell whether the PLC has confirmed it, and no second write is planned (rule 10)."""
+        return self.stands and self.words.again_at == math.inf
 
     @property
     def is_first_try(self) -> bool:

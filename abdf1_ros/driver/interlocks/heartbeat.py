@@ -181,12 +181,14 @@ class HeartbeatRow:
         self._is_confirmed, self.is_first_try = False, True
         self.next_beat = self.due = now
 
-    def end(self, now: float) -> None:
-        """Let 0 be written at the end, at once, also again if another write may still land."""
+    def end(self, now: float) -> bool:
+        """Make a 0 due at the end; return False if the PLC surely holds it already."""
         self.due = now
         self.words.end(now)
-        if not self.is_at_rest or self.words.lands_until > -math.inf:
+        is_due = not self.is_at_rest or self.words.lands_until > -math.inf
+        if is_due:
             self._write_zero(now)
+        return is_due
 
     def write_ended(self, claim: Claim, now: float) -> None:
         """Record the end of a write to this word: a guest may have overwritten our 0."""
@@ -327,6 +329,12 @@ class HeartbeatRow:
         self.next_beat = now + pause
         self.due = math.inf
         return Write(self.mapping, [self.value], now, is_own=True)
+
+    def refresh(self, now: float) -> Write:
+        """Return the write of a 0 that the PLC holds already: it stays confirmed in any case."""
+        self.is_under_way, self.tried = True, now
+        self.due = math.inf
+        return Write(self.mapping, [0], now, is_own=True)
 
     def ended(self, outcome: Outcome, now: float) -> None:
         """Record how the write ended."""

@@ -23,7 +23,7 @@ clock that also counts while the host sleeps (rule 6). None of this is a safety 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container
+from collections.abc import Callable, Container, Iterator
 import math
 from operator import attrgetter
 from random import Random
@@ -90,6 +90,8 @@ class Interlocks(WriteListener):
         self._has_begun = False
         # stations that answered when the end began
         self._awaited: frozenset[int] = frozenset()
+        # rows that stood when the end began, until they are written once more
+        self._standing: tuple[OwnRow, ...] = ()
 
     @property
     def is_ending(self) -> bool:
@@ -106,14 +108,16 @@ class Interlocks(WriteListener):
         """
         Write heartbeats 0, then fallbacks, and take no more messages (rule 5).
 
-        Then the caller has to wake the link. ``is_over`` tells whether all these writes are done;
-        ``unconfirmed`` returns the rows that are not confirmed.
+        Then the caller has to wake the link, and to wait as long as it ``has_to_wait``.
+        ``unconfirmed`` returns the rows that are not confirmed then, ``not_repeated`` those that
+        were confirmed before.
         """
         self.conditions.is_ending = True
 
     def resume(self) -> None:
         """Continue after ``wind_down``: the next opening of the port is a first contact."""
         self.conditions.is_ending, self.conditions.ended = False, math.inf
+        self._standing = ()
         for row in self._plc_of:
             row.words.resume()
 
@@ -123,12 +127,30 @@ class Interlocks(WriteListener):
         Tell whether all writes of the end are done.
 
         Stations that were active when the end began have confirmed all their rows. At silent
-        stations each row has had its try.
+        stations each row has had its try, and so has each row that stood.
         """
-        return not self._plc_of or self.conditions.are_all_due and not any(
-            row.mapping.station in self._awaited or row.is_under_way
-            or row.tried < self.conditions.ended
-            for row in self._plc_of if not row.is_confirmed)
+        return not self._plc_of or self.conditions.are_all_due and not self._is_repeating \
+            and not any(row.mapping.station in self._awaited or row.is_under_way
+                        or row.tried < self.conditions.ended
+                        for row in self._plc_of if not row.is_confirmed)
+
+    @property
+    def _is_repeating(self) -> bool:
+        """Tell whether a row that stood when the end began has still to be written once more."""
+        return any(row.is_under_way or row.tried < self.conditions.ended for row in self._standing)
+
+    def has_to_wait(self, *, is_open: bool,
+                    is_meant: Callable[[Mapping], bool] = lambda mapping: True) -> bool:
+        """
+        Tell whether writes of the end are left that a caller has to wait for (rule 5).
+
+        While the port is lost, these are rows of PLCs that ``is_meant``. Nothing is to wait for if
+        no write has gone out since the start.
+        """
+        if self.is_over:
+            return False
+        return is_open or self._writing.record.has_sent and any(
+            is_meant(row.mapping) for row in self._unconfirmed_rows())
 
     @property
     def keeps_line(self) -> bool:
@@ -138,20 +160,36 @@ class Interlocks(WriteListener):
         A read of a PLC that fails could take all the time that is left, also before a second write
         that is not due yet (rules 5, 10).
         """
-        return self.conditions.are_all_due and any(
-            plc.is_active and not row.is_confirmed for row, plc in self._plc_of.items())
+        return self.conditions.are_all_due and (self._is_repeating or any(
+            plc.is_active and not row.is_confirmed for row, plc in self._plc_of.items()))
 
-    def unconfirmed(self) -> list[str]:
+    def _unconfirmed_rows(self) -> Iterator[OwnRow]:
+        """Return the rows of PLCs where a command may stand, also while the port is lost."""
+        may_begin = self._writing.record.may_begin
+        return (row for plc in self.plcs.values() for row in plc.rows
+                if not row.is_confirmed or not may_begin(row.mapping))
+
+    def unconfirmed(self, now: float) -> list[str]:
         """Return the tags of rows that are not confirmed at the end, or may be overwritten."""
-        now = self._writing.record.line.now
+        tags = [row.mapping.tag for row in self._unconfirmed_rows()]
         held = {row.mapping.tag: row.words.lands_until - now for plc in self.plcs.values()
-                for row in plc.rows if row.is_confirmed and row.words.lands_until > now}
-        return [*(row.mapping.tag for row in self._plc_of if not row.is_confirmed), *(
-            f'{tag} (a gateway may hold a write to it for {seconds:.1f} s)'
-            for tag, seconds in held.items())]
+                for row in plc.rows if row.mapping.tag not in tags and row.words.lands_until > now}
+        return [*tags, *(f'{tag} (a gateway may hold a write to it for {seconds:.1f} s)'
+                         for tag, seconds in held.items())]
+
+    def not_repeated(self) -> list[str]:
+        """Return the tags of rows that stood when the end began, and were not confirmed again."""
+        rows = self._standing if self.conditions.are_all_due else [
+            row for plc in self.plcs.values() for row in plc.rows if row.is_confirmed]
+        return [row.mapping.tag for row in rows]
 
     def begin(self, now: float) -> None:
-        """Begin a first contact with each station: the port has been opened (rule 2)."""
+        """
+        Begin a first contact with each station: the port has been opened (rule 2).
+
+        An end that has lost the port begins anew.
+        """
+        self.conditions.ended, self._standing = math.inf, ()
         self._writing.record.opened()
         if not self._has_begun:
             for row in self.fallbacks:
@@ -243,6 +281,8 @@ class Interlocks(WriteListener):
             rows.append(self._by_mapping[claim.write.mapping])
         for row in rows:
             row.write_ended(claim, now)
+            if not row.is_confirmed:
+                self._leave_standing(row)
             if isinstance(row, FallbackRow):
                 if not row.stands and self.conditions.are_all_due:
                     row.make_due(FallbackCause.END, now)
@@ -266,9 +306,14 @@ class Interlocks(WriteListener):
              only_active: bool = False) -> WriteJob | None:
         """Return the next own write, None for none; ``only_active``: not for silent PLCs."""
         self.expire(now)
-        if self.conditions.are_all_due:
-            only_active |= self._waits_for_active
-            self._writing.stations.probes.keep_none_waiting(now)
+        if not self.conditions.are_all_due:
+            return self._first(now, busy, only_active)
+        only_active |= self._waits_for_active
+        self._writing.stations.probes.keep_none_waiting(now)
+        return self._first(now, busy, only_active) or self._once_more(now, busy, only_active)
+
+    def _first(self, now: float, busy: Container[int], only_active: bool) -> WriteJob | None:
+        """Return the first of all writes that are due."""
         if now < min(map(_due_of, self.plcs.values()), default=math.inf):
             return None
         best: tuple[TurnRank, Plc, OwnRow] | None = None
@@ -284,6 +329,25 @@ class Interlocks(WriteListener):
         if best is None or youngest is None:
             return None
         return self._begin(best[1], best[2], youngest, now)
+
+    def _once_more(self, now: float, busy: Container[int], only_active: bool) -> WriteJob | None:
+        """Return the write of a row that stood when the end began: after all else (rule 5)."""
+        rows = [row for row in self._to_repeat(only_active) if row.mapping.station not in busy]
+        if not rows:
+            return None
+        row = min(rows, key=lambda row: not self._plc_of[row].is_active)
+        return WriteJob(row.refresh(now), self._writing, math.inf,
+                        answer_within=self._answer_within(self._plc_of[row]))
+
+    def _to_repeat(self, only_active: bool) -> Iterator[OwnRow]:
+        """Return the rows that stood when the end began, and were not sent since."""
+        return (row for row in self._standing if row.tried < self.conditions.ended
+                and (self._plc_of[row].is_active or not only_active))
+
+    def _answer_within(self, plc: Plc) -> float:
+        """Return for how long (s) at most to wait for an answer: not for long at the end."""
+        is_last = self.conditions.are_all_due and not plc.is_active
+        return LAST_ANSWER if is_last else math.inf
 
     @property
     def _waits_for_active(self) -> bool:
@@ -308,9 +372,8 @@ class Interlocks(WriteListener):
         is_first = row.is_first_try
         write = row.take(now)
         plc.plan()
-        is_last = self.conditions.are_all_due and not plc.is_active
         return WriteJob(write, self._writing, expires, is_free=is_first,
-                        answer_within=LAST_ANSWER if is_last else math.inf)
+                        answer_within=self._answer_within(plc))
 
     def beats_gave_way(self) -> None:
         """Record that heartbeats gave way to a read: they go next."""
@@ -359,12 +422,21 @@ class Interlocks(WriteListener):
             row.ended(outcome, now)
         else:
             self._fallback_ended(row, write, outcome, now)
+        if outcome is Outcome.WRITTEN:
+            self._leave_standing(row)
+        elif row in self._standing:  # it stood before, so it is not tried again
+            row.words.again_at = math.inf
         plc.plan()  # the row is due, so its heartbeats are judged again, too (rule 3 b)
         if outcome is not Outcome.NOT_SENT:
             refusal = '' if outcome is Outcome.WRITTEN else str(claim.error)
             if isinstance(claim.error, RemoteError) and refusal != row.refusal:
                 self._listener.unreadable(row.mapping, f'not written: {refusal}')
             row.refusal = refusal
+
+    def _leave_standing(self, row: OwnRow) -> None:
+        """Record that a row is not to be written once more: it was, or it is due by now."""
+        if row in self._standing:  # another thread reads them
+            self._standing = tuple(other for other in self._standing if other is not row)
 
     def _fallback_ended(self, row: FallbackRow, write: Write, outcome: Outcome,
                         now: float) -> None:
@@ -395,10 +467,10 @@ class Interlocks(WriteListener):
     def _make_all_due(self, now: float) -> None:
         for row in self.fallbacks:
             self._writes.drop('fallback', now, row.mapping)
-            row.end(now)
+        are_due = {row: row.end(now) for row in self._plc_of}
+        self._standing = tuple(row for row, plc in self._plc_of.items()
+                               if not are_due[row] and plc is not self.ours)
         self._awaited = frozenset(plc.station for plc in self.plcs.values() if plc.is_active)
-        for beat in self.heartbeats:
-            beat.end(now)
         self.conditions.ended = now
         for plc in (*self.plcs.values(), self.ours):
             plc.plan()
@@ -406,6 +478,8 @@ class Interlocks(WriteListener):
     def next_due(self) -> float:
         """Return when the next write is due (clock value in s), infinite for never."""
         due, only_active = math.inf, self._waits_for_active
+        if any(self._to_repeat(only_active)):
+            return -math.inf
         for plc in self.plcs.values():
             if not only_active or plc.is_active:
                 due = plc.next_due(due)

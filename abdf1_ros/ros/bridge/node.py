@@ -35,7 +35,7 @@ from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.ros.bridge.last_writes import LAST_WRITES, take_last_writes
 from abdf1_ros.ros.bridge.offer import OfferedPublisher
 from abdf1_ros.ros.bridge.port_owners import PortOwners
-from abdf1_ros.ros.bridge.reload import changes, refuse_harm
+from abdf1_ros.ros.bridge.reload import changes, refuse_harm, rows_left_behind
 from abdf1_ros.ros.bridge.session import BridgeSession, Surroundings, tell_plcs
 from abdf1_ros.ros.bridge.standby import Service, Standby
 from abdf1_ros.ros.callbacks import AnsweringNode, NodeOptions
@@ -240,8 +240,10 @@ class BridgeNode(AnsweringNode):
            the old session, begin the new one.
         4. Let guests connect, and give up the old port.
         """
-        tell_plcs([self.session], 'goes on with new files', HAND_OVER)
         before = self.session
+        left_behind = rows_left_behind(before.configuration, configuration)
+        tell_plcs([before], 'goes on with new files', HAND_OVER,
+                  is_meant=left_behind.__contains__)
         if self._is_ending:  # the end has begun meanwhile
             return False
         try:
@@ -323,9 +325,8 @@ def end_together(nodes: Sequence[BridgeNode], patience: float = _LONGEST_PUBLISH
     begun = time.monotonic()
     for node in nodes:
         node.begin_end()
-    tell_plcs([node.session for node in nodes if node.link.is_alive()], 'ends', LONGEST_END)
-    for node in nodes:
-        node.link.ask_to_stop()
+    tell_plcs([node.session for node in nodes if node.link.is_alive()], 'ends', LONGEST_END,
+              closes_lines=True)
     for node in nodes:
         node.link.stop()
         node.end_calls()

@@ -24,6 +24,8 @@ from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.ros.bridge.port_owners import held_line
 from abdf1_ros.ros.parameters.declared import Configuration
 from abdf1_ros.settings.columns import MAP_COLUMNS
+from abdf1_ros.settings.limits import raw_values
+from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import FIELDS
 from abdf1_ros.text import first, printable
 
@@ -46,6 +48,17 @@ def refuse_harm(before: Configuration, after: Configuration, is_open: bool,
             problems.append(Problem('port', f'{port.name} cannot be opened: {reason}'))
     if problems:
         raise ConfigurationError(problems)
+
+
+def rows_left_behind(before: Configuration, after: Configuration) -> frozenset[Mapping]:
+    """Return the rows whose words get no safe value, or another one, from new files (rule 5)."""
+    safe = {_safe_words(row) for row in after.mappings.own}
+    return frozenset(row for row in before.mappings.own if _safe_words(row) not in safe)
+
+
+def _safe_words(row: Mapping) -> tuple[object, ...]:
+    """Return the words of a row that the bridge writes by itself, and what it leaves in them."""
+    return row.extent, row.codec, *(raw_values(row, row.fallback.values) if row.fallback else (0,))
 
 
 def changes(before: Configuration, after: Configuration) -> str:

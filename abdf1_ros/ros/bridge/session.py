@@ -248,19 +248,37 @@ class BridgeSession:
         self.driver.interlocks.wind_down()
         self._wake_link()
 
-    def wait_for_plcs(self, give_up: float, what: str) -> None:
+    def has_to_wait(self, is_meant: Callable[[Mapping], bool]) -> bool:
         """
-        Wait until the PLCs confirm, at most to a monotonic clock value; log unconfirmed rows.
+        Tell whether PLCs have still to confirm what the end writes.
+
+        A lost port may come back, for the rows that ``is_meant``. With standby, another bridge may
+        have the line by then.
+        """
+        link = self._surroundings.link
+        is_open = link.state.is_open
+        is_gone = link.is_released or self.configuration.parameters.standby
+        return link.is_alive() and (is_open or not is_gone) \
+            and self.driver.interlocks.has_to_wait(is_open=is_open, is_meant=is_meant)
+
+    def tell_unconfirmed(self, what: str) -> None:
+        """
+        Log the rows that the PLCs have not confirmed, and those that were not written again.
 
         A spare without the line logs none: these rows belong to the bridge that has the line.
         """
-        interlocks, link = self.driver.interlocks, self._surroundings.link
-        while link.state.is_open and link.is_alive() and not interlocks.is_over \
-                and time.monotonic() < give_up:
-            time.sleep(_GLANCE)
-        if not self.is_waiting and (tags := interlocks.unconfirmed()):
-            self._surroundings.node.get_logger().error(
-                f'{what} before the PLC has confirmed: {first(tags)}')
+        has_line = self._surroundings.link.state.is_open
+        if self.is_waiting or self.configuration.parameters.standby and not has_line:
+            return
+        interlocks, logger = self.driver.interlocks, self._surroundings.node.get_logger()
+        if tags := interlocks.unconfirmed(line_time()):
+            logger.error(f'{what} before the PLC has confirmed: {first(tags)}')
+        if tags := interlocks.not_repeated():
+            logger.warning(f'{what}; confirmed before, but not written again: {first(tags)}')
+
+    def close_line(self) -> None:
+        """Let the link end: all is written, or there is no time left."""
+        self._surroundings.link.ask_to_stop()
 
     def _wake_link(self) -> None:
         self._surroundings.link.wake()
@@ -361,17 +379,29 @@ class BridgeSession:
         publisher.publish(message)
 
 
-def tell_plcs(sessions: Sequence[BridgeSession], what: str, limit: float) -> None:
+def tell_plcs(sessions: Sequence[BridgeSession], what: str, limit: float, *,
+              is_meant: Callable[[Mapping], bool] = lambda mapping: True,
+              closes_lines: bool = False) -> None:
     """
     Set heartbeats to 0 and write fallbacks in all sessions, and wait for all (rule 5).
 
     The wait takes at most ``limit`` s. ``what``: what the bridge does next, for the log.
+    ``is_meant``: the rows for which a lost port is waited for. With ``closes_lines`` the link of
+    each session ends when its own end is over: no line waits for another.
     """
     give_up = time.monotonic() + limit
     for session in sessions:
         session.begin_end()
-    for session in sessions:
-        session.wait_for_plcs(give_up, what)
+    left = [*sessions]
+    while left:
+        is_late = time.monotonic() >= give_up
+        for session in [each for each in left if is_late or not each.has_to_wait(is_meant)]:
+            left.remove(session)
+            session.tell_unconfirmed(what)
+            if closes_lines:
+                session.close_line()
+        if left:
+            time.sleep(_GLANCE)
 
 
 def _tell_files(logger: RcutilsLogger, configuration: Configuration) -> None:

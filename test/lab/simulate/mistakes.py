@@ -371,7 +371,7 @@ MISTAKES = (
     Mistake('results', 'rows that share words pass each other', Mapping, 'shares_words',
             lambda before: lambda self, other: self is other),
     Mistake('results', 'a result comes twice', WriteQueue, '__init__', _told_twice),
-    Mistake('5', 'no fallbacks at the end', FallbackRow, 'end', _always(None)),
+    Mistake('5', 'no fallbacks at the end', FallbackRow, 'end', _always(True)),
     Mistake('7', 'a refused message refreshes its row', FallbackRow, 'message_ended',
             _refused_refreshes),
     Mistake('7', 'a clock that is ahead is forgotten', RecentMax, 'add',
