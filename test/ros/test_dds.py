@@ -20,6 +20,7 @@ from pathlib import Path
 import shutil
 import subprocess
 import sys
+from types import SimpleNamespace
 from typing import Any
 from unittest.mock import Mock
 
@@ -162,6 +163,7 @@ class Domain:
     def __init__(self) -> None:
         self.topics: dict[str, list[str]] = {}
         self.names = [('press', '/cell'), ('paint', '/cell')]
+        self.users: dict[tuple[str, str], tuple[str, str]] = {}
         self.looks = 0
 
     def get_node_names_and_namespaces(self) -> list[tuple[str, str]]:
@@ -171,6 +173,14 @@ class Domain:
     def get_topic_names_and_types(self) -> list[tuple[str, list[str]]]:
         self.looks += 1
         return list(self.topics.items())
+
+    def get_publishers_info_by_topic(self, topic: str) -> list[SimpleNamespace]:
+        return [SimpleNamespace(topic_type=kind, node_namespace=namespace, node_name=name)
+                for kind in self.topics.get(topic, ())
+                for name, namespace in [self.users.get((topic, kind), ('press', '/cell'))]]
+
+    def get_subscriptions_info_by_topic(self, topic: str) -> list[SimpleNamespace]:
+        return []
 
 
 @pytest.fixture
@@ -189,7 +199,7 @@ def texts(news: Iterable[News]) -> list[str]:
 
 
 def watch_of(graph: Graph) -> TypeWatch:
-    return TypeWatch(graph, lambda topic: topic.replace('~', '/cell/abdf1'), [
+    return TypeWatch(graph, '/cell/abdf1', lambda topic: topic.replace('~', '/cell/abdf1'), [
         make_mapping('B3:0/0', 'ReadWrite', topic='door'), make_mapping('N7:0', topic='n')])
 
 
@@ -206,6 +216,19 @@ def test_other_type_is_told_once_and_again_when_it_comes_back(
     assert watch.look(30.0) == []
     domain.topics['/cell/abdf1/write/door'] = [BITS, 'std_msgs/msg/Bool']
     assert texts(watch.look(40.0)) == told
+
+
+def test_own_last_publisher_is_not_another_node(domain: Domain, graph: Graph) -> None:
+    domain.topics = {'/cell/abdf1/read/n': [BITS, WORDS]}
+    graph.clashes(9.0)
+    domain.topics = {'/cell/abdf1/read/n': [WORDS]}
+    assert watch_of(graph).look(10.0) == []  # the query is from before the reload
+    domain.topics = {'/cell/abdf1/read/n': [BITS, WORDS]}
+    domain.users = {('/cell/abdf1/read/n', BITS): ('abdf1', '/cell')}
+    watch = watch_of(graph)
+    assert watch.look(20.0) == []  # the reload has not come to an end
+    domain.users = {('/cell/abdf1/read/n', BITS): ('abdf1', '/')}
+    assert len(watch.look(30.0)) == 1
 
 
 def test_looks_at_topics_are_as_far_apart_as_they_are_long(

@@ -118,6 +118,31 @@ def test_rows_come_and_go_and_others_are_not_disturbed(bench: Bench, capfd: Outp
     bench.ros.until(lambda: not node.count_publishers('/abdf1/read/speed'), 'the end of a topic')
 
 
+def test_type_that_a_row_had_before_is_not_told_of_another_node(
+        bench: Bench, capfd: Output) -> None:
+    said = ['']
+
+    def is_told(kind: str) -> bool:
+        said[0] += capfd.readouterr().err
+        return f'/abdf1/read/speed is {kind}' in said[0]
+
+    # Each is a participant of its own, as one has no topic with two types.
+    with ros.Observer() as reader, ros.Observer() as another:
+        reader.node.create_subscription(Int16MultiArray, '/abdf1/read/speed', print, 10)
+        bench.write_map(SPEED.replace('N7:0', 'F8:0'))
+        assert bench.reload()[0]
+        bench.ros.until(lambda: is_told(
+            'std_msgs/msg/Float32MultiArray; another node uses it as std_msgs/msg/Int16MultiArray'
+        ), 'the reader')
+        bench.write_map(SPEED)
+        assert bench.reload()[0]
+        another.node.create_subscription(String, '/abdf1/read/speed', print, 10)
+        bench.ros.until(lambda: is_told(
+            'std_msgs/msg/Int16MultiArray; another node uses it as std_msgs/msg/String'
+        ), 'a later query')
+    assert 'another node uses it as std_msgs/msg/Float32MultiArray' not in said[0]
+
+
 def test_writes_go_to_the_new_map(bench: Bench) -> None:
     results = bench.results
     publisher = bench.ros.publisher(Int16MultiArray, '/abdf1/write/recipe')

@@ -136,7 +136,8 @@ class BridgeSession:
         self.owners = InterlockWatch(node, self.driver)
         self._watches: list[Watch] = [
             surroundings.names,
-            TypeWatch(surroundings.graph, node.resolve_topic_name, mappings),
+            TypeWatch(surroundings.graph, node.get_fully_qualified_name(),
+                      node.resolve_topic_name, mappings),
             *watches_of(self.diagnostics.line, self.port, seen, self.guests.lines,
                         configuration.files.changed, self.owners.look,
                         surroundings.graph.dds.look)]

@@ -85,6 +85,16 @@ class Graph:
             self._next_topics = now + max(_LEAST, _MULTIPLE * (thread_time() - begun))
         return self._clashes
 
+    def has_other(self, topic: str, kind: str, name: str) -> bool:
+        """Tell whether a node other than ``name`` has this topic with this type now."""
+        try:
+            ends = [*self._source.get_publishers_info_by_topic(topic),
+                    *self._source.get_subscriptions_info_by_topic(topic)]
+        except UnicodeDecodeError:  # rclpy cannot read the name of a node, so it is not ours
+            return True
+        return any(end.topic_type == kind
+                   and f'{end.node_namespace.rstrip("/")}/{end.node_name}' != name for end in ends)
+
 
 class NameWatch:
     """
@@ -135,12 +145,14 @@ class TypeWatch:
     """
     Watches the topics of a map for nodes that use another type: DDS does not connect them.
 
-    ``resolve`` returns the full name of a topic.
+    ``resolve`` returns the full name of a topic; ``name`` is the full name of our node. Before a
+    reload a topic may have had another type, and a query may be older than that.
     """
 
-    def __init__(self, graph: Graph, resolve: Callable[[str], str],
+    def __init__(self, graph: Graph, name: str, resolve: Callable[[str], str],
                  mappings: Iterable[Mapping]) -> None:
         self._graph = graph
+        self._name = name
         self._own = {
             resolve(f'~/{what}/{mapping.topic}'): f'std_msgs/msg/{mapping.message_type.message}'
             for mapping in mappings for what, is_there in (
@@ -155,7 +167,9 @@ class TypeWatch:
             return []
         self._seen = clashes
         found = {(topic, kind) for topic in clashes.keys() & self._own.keys()
-                 for kind in clashes[topic] if kind != self._own[topic]}
+                 for kind in clashes[topic] if kind != self._own[topic]
+                 and ((topic, kind) in self._told
+                      or self._graph.has_other(topic, kind, self._name))}
         news, self._told = found - self._told, found
         return [News(WARN, 'types of topics', (
             f'{topic} is {self._own[topic]}; another node uses it as {kind}, and DDS does not '
