@@ -36,7 +36,7 @@ from abdf1_ros.pccc.members import Members
 from abdf1_ros.pccc.notation import Effect
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.status import Meanings, status_text, USUAL_MEANINGS
-from abdf1_ros.pccc.targets import Target
+from abdf1_ros.pccc.targets import CLOCK_WORDS, Target
 from abdf1_ros.pccc.values import types_of
 from abdf1_ros.plan.report import make_report
 from abdf1_ros.settings.columns import MAP_COLUMNS
@@ -311,7 +311,18 @@ def rights() -> str:
                 if kind is Target.CLOCK:
                     continue  # no difference from the other words
                 name = name.removeprefix('other ')
+            elif kind is Target.CLOCK:
+                name += f' ({_clocks(form)})'
             rows.append((form or 'any', ', '.join(codes), name, f'`{right.value}`'))
     rows += [('any', 'any other, and one that is malformed', Target.OTHER.value, '`All`'),
              ('any', 'any to all stations (DST 255)', 'all that hear it', '`All`')]
     return table(('PLC', 'command', 'it addresses', '`Share_Access`'), rows)
+
+
+def _clocks(form: str) -> str:
+    """Return the words of the clocks that commands with this form of address reach."""
+    clocks = [FAMILIES[kind].addressing.parse(FAMILIES[kind].clock)
+              for kind in (PlcType.PLC5, PlcType.SLC)]
+    return ', '.join(
+        f'{clock.addressing.title} {clock} to {clock.at_offset(clock.offset + CLOCK_WORDS - 1)}'
+        for clock in clocks if clock.addressing.title in form or NAMES[PlcType.PLC5] in form)

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from abdf1_ros.df1.packet import BROADCAST, Packet, PRIORITY_BIT
 from abdf1_ros.errors import FormatError
@@ -24,6 +25,7 @@ from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address, Area
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.extent import Extent
+from abdf1_ros.pccc.fields import word
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.plc2 import commands as plc2
 from abdf1_ros.pccc.plc5 import commands as plc5
@@ -40,8 +42,23 @@ ReplyWords = dict[tuple[Area, int], bytes]
 # from C0 to FF. So no code can be found across two words, nor in a descriptor.
 _DIGIT = 64
 
+_ALL_BITS = 0xFFFF
+
 _BASIC = (plc2.READ, plc2.UNPROTECTED_WRITE, plc2.PROTECTED_WRITE, plc2.PROTECTED_BIT_WRITE,
           plc2.UNPROTECTED_BIT_WRITE)
+
+
+@dataclass(frozen=True, slots=True)
+class WrittenWords:
+    """
+    Words that a command writes, and their new bytes; None if some of their bits stay.
+
+    ``is_certain`` is False for words that it only may write.
+    """
+
+    extent: Extent
+    data: bytes | None
+    is_certain: bool = True
 
 
 class _NotedTable(DataTable):
@@ -58,7 +75,7 @@ class _NotedTable(DataTable):
         self._others = others
         self._types = {row.address.file: row.address.file_type for row in rows
                        if not row.address.is_by_type}
-        self.written: list[tuple[Address, int]] = []
+        self.written: list[tuple[Address, int, bytes | None]] = []
         self.files: set[int] = set()
         self.is_elsewhere = False
 
@@ -75,9 +92,16 @@ class _NotedTable(DataTable):
 
     def write(self, address: Address, data: bytes) -> None:
         """Note which words of files of rows are written."""
+        self._note(address, len(data) // 2, data)
+
+    def write_bits(self, address: Address, mask: int, bits: int) -> None:
+        """Note which word of a file of rows is written; its new bytes if no bit stays."""
+        self._note(address, 1, word(bits) if mask == _ALL_BITS else None)
+
+    def _note(self, address: Address, words: int, data: bytes | None) -> None:
         self.files.add(address.file)
         if address.is_by_type or address.file in self._types:
-            self.written.append((address, len(data) // 2))
+            self.written.append((address, words, data))
 
 
 def _uses_common_file(command: Packet, rows: Sequence[Mapping]) -> bool:
@@ -98,8 +122,13 @@ def _may_be_common(row: Mapping) -> bool:
     return row.access is Access.CIF or row.address.file in CIF_FILES
 
 
-def written_extents(command: Packet, station: int,
-                    mappings: Rows) -> list[Extent] | None:
+def written_extents(command: Packet, station: int, mappings: Rows) -> list[Extent] | None:
+    """Return the places of the words that ``written_words`` returns, None if they are unknown."""
+    words = written_words(command, station, mappings)
+    return None if words is None else [written.extent for written in words]
+
+
+def written_words(command: Packet, station: int, mappings: Rows) -> list[WrittenWords] | None:
     """
     Return the words of the files of ``mappings`` that a command to a station writes.
 
@@ -109,22 +138,25 @@ def written_extents(command: Packet, station: int,
     """
     rows = [mapping for mapping in mappings.of_plcs
             if station in (mapping.station, BROADCAST)]
-    found: list[Extent] = []
+    found: list[WrittenWords] = []
     is_known = not rows
     for number, plc_type in {(row.station, row.plc_type): None for row in rows}:
         there = [row for row in rows if row.station == number]
         if _uses_common_file(command, there):
-            found += [row.extent for row in there if _may_be_common(row)]
+            found += [WrittenWords(row.extent, None, is_certain=False)
+                      for row in there if _may_be_common(row)]
             is_known = True
             continue
         # A command may name files with and without rows.
         table = _NotedTable(plc_type, there, FileType.INTEGER)
         reply = Server(table).serve(command)
         if not reply.sts or table.is_elsewhere:
-            found += [Extent(number, address.area, address.offset, address.offset + words)
-                      for address, words in table.written]
+            found += [WrittenWords(
+                Extent(number, address.area, address.offset, address.offset + words), data)
+                for address, words, data in table.written]
             if table.files & CIF_FILES:
-                found += [row.extent for row in there if row.access is Access.CIF]
+                found += [WrittenWords(row.extent, None, is_certain=False)
+                          for row in there if row.access is Access.CIF]
             is_known = True
     return found if is_known else None
 

@@ -24,7 +24,9 @@ from collections.abc import Callable, Collection
 from enum import Enum
 
 from abdf1_ros.df1.packet import BROADCAST, Packet
-from abdf1_ros.driver.foreign_words import written_extents
+from abdf1_ros.driver.foreign_words import written_words, WrittenWords
+from abdf1_ros.driver.guest_limits import check_floats, check_values, limited
+from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.describe import effect_of, targets_of
 from abdf1_ros.pccc.extent import Extent
@@ -35,6 +37,7 @@ from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.targets import Partner, Target
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.rows import Rows
+from abdf1_ros.text import first
 
 
 class ShareAccess(Enum):
@@ -102,12 +105,37 @@ class GuestRules:
                   for target in targets_of(command, self._partner(station))]
         return max(rights, key=list(ShareAccess).index)
 
+    def limit_broken(self, command: Packet, access: ShareAccess) -> str:
+        """
+        Return which limit the values of a command break, empty if none.
+
+        A guest with All may write words that are not known.
+        """
+        if effect_of(command) is not Effect.WRITES:
+            return ''
+        station, has_all = self.station_of(command.dst), access is ShareAccess.ALL
+        rows = limited(self._mappings, station)
+        try:
+            check_floats(command)
+            words = self._written(command, station) if rows else []
+            if words is not None:
+                check_values(rows, [each for each in words if each.is_certain or not has_all])
+            elif not has_all:
+                raise FormatError(f'{first([row.tag for row in rows])}: limits, and which words '
+                                  'it writes is not known')
+        except FormatError as error:
+            return str(error)
+        return ''
+
     def words_of(self, command: Packet, station: int) -> list[Extent] | None:
         """Return the words of rows that a command to a station writes, None if unknown."""
+        words = self._written(command, station)
+        return None if words is None else [written.extent for written in words]
+
+    def _written(self, command: Packet, station: int) -> list[WrittenWords] | None:
         # A PLC-5 has separate words for each station number that sends it PLC-2 writes. On the
         # line this number is ours.
-        return written_extents(
-            command._replace(src=self._network.station), station, self._mappings)
+        return written_words(command._replace(src=self._network.station), station, self._mappings)
 
     def _partner(self, station: int) -> Partner:
         rows = [row for row in self._mappings.of_plcs if row.station == station]

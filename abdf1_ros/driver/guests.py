@@ -18,8 +18,9 @@ Commands of guests: programs that share the PLC's port with us, each at a place 
 A guest's command waits here for its turn on the line and gets exactly one reply, in time. This is
 the reply of the PLC, or our reply with an STS of M 8-2.
 
-- Not sent: 60 (not allowed), 01 (no buffer, too old to be sent, or a pause of ``unanswered``), 04
-  (the port is not open), 07 (the station is silent).
+- Not sent: 60 (not allowed), F0 with EXT STS 12 (a value outside of a limit), 01 (no buffer, too
+  old to be sent, or a pause of ``unanswered``), 04 (the port is not open), 07 (the station is
+  silent).
 - Sent, without a reply: 02 (the station has become silent), 05 (no reply in time). Whether it was
   executed is then unknown.
 """
@@ -44,11 +45,13 @@ from abdf1_ros.errors import CommandExpired, PortLost, StationInactive
 from abdf1_ros.pccc.describe import effect_of
 from abdf1_ros.pccc.dialect import Steps
 from abdf1_ros.pccc.notation import Effect
+from abdf1_ros.pccc.status import EXT_BAD_PARAMETER, EXTENDED
 
 _MOST_WAITING = 16  # commands of a guest; AbDf1 sends this many before it waits for a reply
 
 _NO_BUFFER, _NOT_ACKNOWLEDGED, _NOT_CONNECTED, _NO_REPLY, _OFF_LINE = 0x01, 0x02, 0x04, 0x05, 0x07
 _NOT_ALLOWED = 0x60
+_BAD_VALUE = bytes((EXT_BAD_PARAMETER,))
 
 
 class GuestListener:
@@ -66,6 +69,9 @@ class GuestListener:
     def was_refused(self, guest: Guest, command: Packet, needed: ShareAccess) -> None:
         """Take a command that was not allowed, and the right that it needs."""
 
+    def broke_limit(self, guest: Guest, command: Packet, limit: str) -> None:
+        """Take a command whose values were refused, and the limit that they broke."""
+
     def was_unanswered(self, guest: Guest, command: Packet, sts: int) -> None:
         """Take a command that got an STS of ours in place of a reply of the PLC."""
 
@@ -80,6 +86,7 @@ class Guest:
 
     - ``refused``: number of commands that were not allowed.
     - ``beyond``: number of commands, allowed or not, that only All allows.
+    - ``outside``: number of commands whose values broke a limit.
     - ``unanswered``: number of commands without a reply of the PLC.
     - ``collisions``: number of writes to words that we write too.
     - ``slowest``: longest time (s) to a reply.
@@ -93,6 +100,7 @@ class Guest:
     commands: int = 0
     refused: int = 0
     beyond: int = 0
+    outside: int = 0
     unanswered: int = 0
     slowest: float = 0.0
     collisions: int = 0
@@ -170,6 +178,11 @@ class GuestQueue:
             guest.refused += 1
             guest.listener.was_refused(guest, command.packet, needed)
             _refuse(command, _NOT_ALLOWED)
+            return
+        if limit := self._rules.limit_broken(command.packet, guest.access):
+            guest.outside += 1
+            guest.listener.broke_limit(guest, command.packet, limit)
+            command.answer(command.packet.reply(_BAD_VALUE, EXTENDED))
             return
         if needed is ShareAccess.ALL:
             guest.listener.goes_beyond(guest, command.packet)

@@ -55,6 +55,30 @@ def raw_values(mapping: Mapping, values: Sequence[float] | str) -> Sequence[floa
     return _raw_inside(mapping, values)
 
 
+def check_foreign(mapping: Mapping, raw: float, index: int) -> None:
+    """
+    Check a raw value that another program writes.
+
+    Raises FormatError where a limit or the type forbids it. The float32 nearest to a limit counts
+    as the limit.
+    """
+    if not math.isfinite(raw):
+        raise FormatError(f'value {raw} at index {index} is not a valid {mapping.type.value}')
+    scaling, tolerance = mapping.scaling or _UNSCALED, _EXACT
+    low, high = sorted((end - scaling.offset) / scaling.scale
+                       for end in (mapping.minimum, mapping.maximum))
+    if mapping.type is ValueType.FLOAT32:
+        nearest = array('f', (low, high))
+        low, high, tolerance = min(low, nearest[0]), max(high, nearest[1]), 0.0
+    if not low - tolerance <= raw <= high + tolerance:
+        raise _outside(mapping, index, raw * scaling.scale + scaling.offset)
+
+
+def has_limits(mapping: Mapping) -> bool:
+    """Tell whether some values that the words of a row can hold must not be written."""
+    return mapping.type is ValueType.FLOAT32 or (mapping.minimum, mapping.maximum) != _NO_LIMITS
+
+
 def _raw_inside(mapping: Mapping, values: Sequence[float]) -> list[float]:
     """Return raw values inside the limits; FormatError where the nearest raw value is outside."""
     scaling, low, high = mapping.scaling or _UNSCALED, mapping.minimum, mapping.maximum

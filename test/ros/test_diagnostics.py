@@ -897,13 +897,16 @@ def test_guests_are_counted_and_told_of(bench: Bench) -> None:
         OK, 'OK: 1 of 2 guests are connected', PORT)
     guests[1].commands = guests[1].refused = guests[1].collisions = 1
     guests[0].refused = guests[0].unanswered = 2
+    guests[0].outside = 3
     guests[0].waiting.extend(cast(Any, range(3)))
     assert bench.says('guests') == (WARN, (
-        'WARN: 1 of 2 guests are connected; 3 commands not allowed; 1 write to words of this '
-        'bridge'))
+        'WARN: 1 of 2 guests are connected; 3 commands not allowed; 3 writes outside of limits; '
+        '1 write to words of this bridge'))
     assert bench.details('guests') == {
-        'pty:a': 'open; 1 command, 2 not allowed, 2 without reply, 3 waiting, slowest 250 ms',
-        'tcp:7': 'open; 1 command, 1 not allowed, 0 without reply, 0 waiting, slowest unknown'}
+        'pty:a': 'open; 1 command, 2 not allowed, 3 outside of limits, 2 without reply, '
+                 '3 waiting, slowest 250 ms',
+        'tcp:7': 'open; 1 command, 1 not allowed, 0 outside of limits, 0 without reply, '
+                 '0 waiting, slowest unknown'}
     lines[0].fault, lines[1].fault = 'gone', 'in use'
     assert bench.says('guests') == (ERROR, 'ERROR: pty:a: gone; tcp:7: in use')
 

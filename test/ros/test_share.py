@@ -150,6 +150,19 @@ def test_first_command_that_only_all_allows_is_told_whatever_the_right_of_the_gu
         'protected typed logical read file 2 type 22 element 0, 40 words']
 
 
+def test_first_value_outside_of_a_limit_is_told_with_tag_and_limit() -> None:
+    row = make_mapping('F8:0', 'Write', plc='SLC', tag='speed', minimum=0.0, maximum=10.0)
+    queue = DriverBench([row]).driver.guests
+    places, notes = places_of()
+    guest = Guest('tcp:1', ShareAccess.WRITE, places)
+    for data in ('AA 04 08 8A 00 00 00 00 30 41', 'AA 04 08 8A 00 00 00 00 C0 7F'):
+        queue.put(GuestCommand(guest, Packet(1, 9, 15, 0, 7, bytes.fromhex(data)), 0.0, Mock()))
+    assert guest.outside == 2
+    assert told_by(notes) == [
+        'guest tcp:1: command refused: 0F/AA to station 1, protected typed logical write '
+        'F8:0 = 11; speed: value 11 at index 0 is outside Min 0, Max 10']
+
+
 def test_internal_error_in_the_line_of_a_guest_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(GuestLine, 'open_port', Mock(side_effect=KeyError('a bug')))
     line, notes = Mock(network=Network(share='tcp:4501')), Mock()

@@ -27,6 +27,7 @@ from abdf1_ros.driver.guest_rules import ShareAccess
 from abdf1_ros.driver.guests import GuestListener
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
+from abdf1_ros.settings.scaling import Scaling
 from abdf1_ros.settings.share import share_places
 from abdf1_ros.share.guest_line import GuestLine
 import pytest
@@ -35,7 +36,7 @@ from support.mappings import make_mapping
 from support.odd_device import ACK, frame, OddDevice, Wiring
 
 READ, WRITE, ALL = ShareAccess
-NOT_ALLOWED, NO_REPLY, SILENT = 0x60, 0x05, 0x07
+NOT_ALLOWED, NO_REPLY, SILENT, BAD_VALUE = 0x60, 0x05, 0x07, 0xF0
 
 # Name, the least right, and the command: CMD and what follows TNS. The map has one row, N7:0 of an
 # SLC. Manual: 1770-6.5.16. PLC-5 section 1 is its program (M 13-13 has only section 0).
@@ -198,6 +199,7 @@ class Place:
             return was_sent, None
         reply = reply.replace(b'\x10\x10', b'\x10')
         assert (reply[:3], reply[4:6]) == (bytes((0x33, dst, body[0] | 0x40)), tns)
+        assert reply[6:7] == b'\x12' or reply[3] != BAD_VALUE
         return was_sent, reply[3]
 
 
@@ -237,3 +239,92 @@ def test_command_to_all_stations_needs_all_and_is_not_confirmed(access: ShareAcc
         [NO_REPLY, NO_REPLY, SILENT] if access is ALL else [NOT_ALLOWED] * 3)
     heard = [data[6:].hex(' ').upper() for data in device.executed if data[0] == 255]
     assert heard == ([text[3:] for text in texts[:2]] if access is ALL else [])
+
+
+def limited_rows(plc: str) -> list[Mapping]:
+    """Return rows with limits, with floats, and without any."""
+    rows = [
+        make_mapping('N7:10', 'Write', plc=plc, length=3, tag='speed', minimum=0.0, maximum=100.0),
+        make_mapping('F8:0', 'Write', plc=plc, length=2, tag='heat', minimum=0.1, maximum=10.0),
+        make_mapping('F8:10', plc=plc, tag='level', period=5000),
+        make_mapping('N7:20', 'Write', plc=plc, kind='int32', tag='wide', minimum=-5.0,
+                     maximum=70_000.0),
+        make_mapping('N7:30', 'Write', plc=plc, tag='scaled', minimum=0.0, maximum=5.0,
+                     scaling=Scaling(0.1, -10.0)),
+        make_mapping('N7:50', 'Write', plc=plc, kind='float32', word_order='High', tag='high'),
+        make_mapping('B3:0/0', 'Write', plc=plc, length=4, tag='bits'),
+        make_mapping('N7:40', 'Write', plc=plc, tag='plain')]
+    return rows
+
+
+# Commands to an SLC with these rows that must not reach it, because of their values.
+OF_SLC = (
+    '0F AA 02 07 89 0A 00 65 00', '0F AA 02 07 89 0C 00 FF FF', '0F A9 02 07 89 0A 65 00',
+    '0F AA 06 07 89 09 00 65 00 64 00 65 00',  # N7:9 may be 101, N7:11 not
+    '0F AB 02 07 89 0A 00 FF 00 01 00', '0F AB 02 07 89 0A 00 FF FF 65 00',
+    '0F 67 00 00 01 00 06 07 0A 42 65 00',
+    '0F AA 04 08 8A 00 00 00 00 30 41', '0F AA 04 08 8A 01 00 FF FF FF FF',  # 11.0, NaN
+    '0F AA 04 08 8A 00 00 CC CC CC 3D',  # the float32 below 0.1
+    '0F AA 02 08 8A 00 01 30 41', '0F AB 04 08 8A 00 00 0F 00 00 00 A0 40',
+    '0F AA 04 08 8A 0A 00 00 00 80 7F', '0F AA 04 08 8A 0A 00 00 00 C0 FF',  # infinity, NaN
+    '0F AA 04 08 8A 32 00 FF FF FF FF', '0F AA 02 08 8A 32 01 FF FF',  # F8:50, of no row
+    '0F AB 04 08 8A 32 00 FF FF FF FF FF FF', '0F AB 04 08 8A 32 00 00 FF FF FF FF FF',
+    '0F AA 04 07 89 14 00 71 11 01 00', '0F AA 02 07 89 14 00 00 00', '0F AA 02 07 89 15 00 00 00',
+    '0F AA 02 07 89 1E 00 97 00', '0F AA 02 07 89 1E 00 63 00',
+    '0F AA 04 07 89 32 00 C0 7F 00 00', '2F AA 02 07 89 0A 00 65 00')
+# Which words these write is not known: a type that does not fit, an odd size, a file write, a
+# command of another family, and the common interface file, which may count bytes.
+UNKNOWN = (
+    '0F AA 02 07 85 0A 00 01 00', '0F AA 03 07 89 0A 00 01 00 01',
+    '0F 03 00 00 01 00 06 07 0A 01 00', '0F 00 00 00 01 00 06 07 0A 01 00', '08 0A 00 01 00')
+GOOD = (
+    '0F AA 02 07 89 0A 00 64 00', '0F AA 06 07 89 0B 00 00 00 64 00 65 00',
+    '0F AB 02 07 89 0A 00 FF FF 64 00', '0F AA 08 08 8A 00 00 00 00 20 41 CD CC CC 3D',  # 10, 0.1
+    '0F AA 04 08 8A 0A 00 CA F2 49 F1', '0F AA 04 08 8A 32 00 CA F2 49 71',
+    '0F AA 04 07 89 14 00 70 11 01 00', '0F AA 04 07 89 14 00 FB FF FF FF',
+    '0F AA 02 07 89 1E 00 96 00', '0F AA 02 07 89 1E 00 64 00',
+    '0F AA 04 07 89 32 00 80 3F 00 00', '0F AB 02 03 85 00 00 05 00 05 00',
+    '0F AA 02 07 89 28 00 FF FF', '0F AB 02 07 89 28 00 0F 00 01 00')
+
+
+@pytest.mark.parametrize('access', [WRITE, ALL])
+def test_values_of_guests_keep_the_limits_of_the_rows(access: ShareAccess) -> None:
+    place = Place(access, rows=limited_rows('SLC'))
+    refused, sent = (False, BAD_VALUE), (True, 0)
+    assert [(text, found) for text in OF_SLC if (found := place.ask(text)) != refused] == []
+    assert [(text, found) for text in GOOD if (found := place.ask(text)) != sent] == []
+    expected = sent if access is ALL else refused
+    assert [(text, found) for text in UNKNOWN if (found := place.ask(text)) != expected] == []
+    guest = place.line.guest
+    assert guest.outside == len(OF_SLC) + len(UNKNOWN) * (access is WRITE)
+    assert guest.refused == 0
+
+
+@pytest.mark.parametrize(('text', 'is_good'), [
+    ('0F 67 00 00 01 00 06 07 0A 42 64 00', True), ('0F 67 00 00 01 00 06 07 0A 42 65 00', False),
+    ('0F 00 00 00 01 00 06 07 0A 65 00', False), ('0F 00 01 00 02 00 06 07 09 65 00', False),
+    ('0F 26 06 07 0A FF FF 01 00', False), ('0F 26 06 07 0A 00 00 40 00', True),
+    ('0F 02 06 07 0A 01 00 00 00', False), ('0F 26 06 03 00 FF FF 01 00', True),
+    # 11.0 and 5.0: in a word range command the high word comes first.
+    ('0F 00 00 00 02 00 06 08 00 30 41 00 00', False),
+    ('0F 00 00 00 02 00 06 08 00 A0 40 00 00', True),
+    ('0F 00 00 00 01 00 06 08 00 30 41', False),
+    ('0F 67 00 00 01 00 06 08 00 96 09 94 08 00 00 A0 40', True),
+    ('0F 67 00 00 01 00 06 08 00 96 09 94 08 00 00 30 41', False),
+    ('0F 67 00 00 01 00 06 14 00 96 09 94 08 FF FF FF FF', False),  # F20:0, of no row
+    ('0F 67 00 00 01 00 06 14 00 96 09 94 08 CA F2 49 71', True),
+    ('0F 79 01 06 07 28 02 FF FF 01 00', False), ('08 28 00 01 00', True)])
+def test_values_for_a_plc5_keep_the_limits_of_its_rows(text: str, is_good: bool) -> None:
+    place = Place(WRITE, rows=limited_rows('PLC5'))
+    assert place.ask(text) == ((True, 0) if is_good else (False, BAD_VALUE))
+
+
+def test_values_for_all_stations_keep_the_limits_of_each() -> None:
+    place = Place(ALL, 'Master', limited_rows('SLC'))
+    assert place.ask('0F AA 02 07 89 0A 00 65 00', 255) == (False, BAD_VALUE)
+    assert place.ask('0F AA 02 07 89 0A 00 64 00', 255)[1] == NO_REPLY
+
+
+def test_station_without_limits_takes_words_that_are_not_known() -> None:
+    place = Place(WRITE)
+    assert [place.ask(text) for text in UNKNOWN] == [(True, 0)] * len(UNKNOWN)

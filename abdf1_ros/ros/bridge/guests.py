@@ -110,6 +110,12 @@ class GuestPlaces(GuestListener):
                 f'guest {guest.name}: command refused: {_meant(command)}; it needs Share_Access '
                 f'{needed.value}, and has {guest.access.value}'))
 
+    def broke_limit(self, guest: Guest, command: Packet, limit: str) -> None:
+        """Log only the first command whose values are outside of a limit."""
+        if guest.outside == 1:
+            self._notes.warning(f'guest {guest.name}', (
+                f'guest {guest.name}: command refused: {_meant(command)}; {limit}'))
+
     def _fault(self, error: Exception) -> None:
         self._notes.error(
             'guests', f'internal error in the line of a guest: {error!r}; please report it')

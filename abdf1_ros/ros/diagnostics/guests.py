@@ -37,6 +37,7 @@ class GuestsStatus:
         connected = sum(guest.is_connected for guest in guests)
         notes = [f'{counted(count, what)} {why}' for count, what, why in (
             (sum(guest.refused for guest in guests), 'command', 'not allowed'),
+            (sum(guest.outside for guest in guests), 'write', 'outside of limits'),
             (sum(guest.collisions for guest in guests), 'write', 'to words of this bridge'))
             if count]
         text = f'{connected} of {len(guests)} guests are connected'
@@ -48,6 +49,7 @@ class GuestsStatus:
     def values(self, now: float) -> dict[str, str]:
         return {line.guest.name: (
             f'{line.state}; {counted(line.guest.commands, "command")}, '
-            f'{line.guest.refused} not allowed, {line.guest.unanswered} without reply, '
+            f'{line.guest.refused} not allowed, {line.guest.outside} outside of limits, '
+            f'{line.guest.unanswered} without reply, '
             f'{len(line.guest.waiting)} waiting, '
             f'slowest {milliseconds(line.guest.slowest or None)}') for line in self._lines}
