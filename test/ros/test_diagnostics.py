@@ -844,6 +844,22 @@ def test_heartbeat_that_the_plc_does_not_confirm_does_not_count(make_bench: Benc
     assert values['bound of alive'].startswith('PLC timer presets ')
 
 
+@pytest.mark.parametrize('text', ['the port was lost: No such device', RELEASED])
+def test_no_heartbeat_counts_while_the_port_is_closed(make_bench: Benches, text: str) -> None:
+    bench = make_bench('alive,Heartbeat,N10:0,1,PLC5,500')
+    beat = bench.driver.interlocks.heartbeats[0]
+    beat.confirmed, beat.state, beat.value = NOW, BeatState.COUNTS, 1
+    assert bench.says('interlocks', NOW + 0.1) == (OK, 'OK: 1 of 1 heartbeats count')
+    bench.set_port(False, text)
+    assert bench.says('interlocks', NOW + 0.1) == (
+        WARN, 'WARN: 0 of 1 heartbeats count; alive: heartbeat does not count')
+    values = bench.details('interlocks', NOW + 0.1)
+    assert values['alive'] == f'heartbeat 1, 0.1 s ago; does not count: {text}'
+    assert values['station 1'] == f'not in control: {text}'
+    bench.set_port(True, 'open')
+    assert bench.details('interlocks', NOW + 0.1)['station 1'] == 'heartbeat counts (for 0.0 s)'
+
+
 def test_bit_of_the_plc_confirms_control_while_it_is_fresh_and_1(
         make_bench: Benches, monkeypatch: pytest.MonkeyPatch) -> None:
     bench = make_bench('alive,Heartbeat,N10:0,1,PLC5,60000,,8',

@@ -19,11 +19,11 @@ from __future__ import annotations
 from enum import IntEnum
 from operator import itemgetter
 
-from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.interlocks.fallback import FallbackRow, FallbackState
 from abdf1_ros.driver.interlocks.heartbeat import BeatState, HeartbeatRow
 from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.plan.bounds import Bound, Times
+from abdf1_ros.ros.diagnostics.line import LineView
 from abdf1_ros.ros.diagnostics.stations import processor_fault
 from abdf1_ros.ros.diagnostics.status import ERROR, Judgement, OK, Seen, WARN, with_age
 from abdf1_ros.text import age_text, milliseconds
@@ -43,9 +43,11 @@ class InterlockStatus:
 
     name = 'interlocks'
 
-    def __init__(self, driver: Driver, port: str, seen: Seen) -> None:
+    def __init__(self, line: LineView, port: str, seen: Seen) -> None:
         self.hardware_id = port
+        self._line = line
         self._watched = seen
+        driver = line.driver
         self._beats = driver.interlocks.heartbeats
         self._fallbacks = driver.interlocks.fallbacks
         self._checks = driver.checks
@@ -76,7 +78,7 @@ class InterlockStatus:
         return level, '; '.join([text, *notes])
 
     def _why_not(self, beat: HeartbeatRow, now: float) -> str:
-        reason = beat.why_not(now)
+        reason = self._line.why_closed or beat.why_not(now)
         if _is_taken(beat):
             reason = self._watched.conflicts.get(beat.mapping.tag, reason)
         self._seen(beat.mapping.tag, not reason, now)

@@ -56,8 +56,12 @@ class LineView:
         self.link, self.opener = link, opener
 
     @property
-    def is_open(self) -> bool:
-        return self.link is not None and self.link.state.is_open
+    def why_closed(self) -> str:
+        """Return why the port is not open; empty if it is."""
+        if self.link is None:
+            return 'not started yet'
+        state = self.link.state
+        return '' if state.is_open else state.text
 
     def fault(self, now: float) -> str:
         """Return the fault of the line: our number twice, or an echo; empty if there is none."""

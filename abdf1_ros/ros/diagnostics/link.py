@@ -62,8 +62,8 @@ class LinkStatus:
         link, driver = self._line.link, self._line.driver
         if link and link.is_released:
             return WARN, RELEASED
-        if link is None or not link.state.is_open:
-            return ERROR, link.state.text if link else 'not started yet'
+        if why := self._line.why_closed:
+            return ERROR, why
         polled = driver.link.status().last_poll
         if polled is not None and now - polled > _LONGEST_UNPOLLED:
             return WARN, f'port open, but not polled for {now - polled:.0f} s'
@@ -108,7 +108,7 @@ class LinkStatus:
         driver, opener = self._line.driver, self._line.opener
         self._rate.update(driver, now)
         return {
-            'port': 'open' if self._line.is_open else 'closed',
+            'port': 'closed' if self._line.why_closed else 'open',
             'settings': _settings(driver.network),
             'transactions per second': f'{self._rate.transactions:.1f}',
             'line load': f'{self._rate.load:.0f} %',

@@ -69,7 +69,7 @@ class StationStatus:
 
     def judge(self, now: float) -> Judgement:
         station, line = self._station, self._line
-        if not line.is_open:
+        if line.why_closed:
             return ERROR, f'station {station.number} unknown: the port is not open'
         if line.is_deaf(station, now):
             return WARN, deaf_text(station.number)

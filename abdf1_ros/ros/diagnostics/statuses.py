@@ -56,7 +56,7 @@ class Diagnostics:
             *(StationStatus(self.line, station, port, seen) for station in driver.stations),
             MappingsStatus(driver, port, left_out), events.writes, *alarms]
         if driver.interlocks.heartbeats or driver.interlocks.fallbacks:
-            self._statuses.append(InterlockStatus(driver, port, seen))
+            self._statuses.append(InterlockStatus(self.line, port, seen))
         if guests:
             self._statuses.append(GuestsStatus(guests, port))
         self._waiting: list[Status] = [StandbyStatus(self.line, port, seen)]
