@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from copy import copy
 from dataclasses import dataclass
 from typing import TypeVar
@@ -220,17 +220,24 @@ def _ranged(read: Callable[[Reader, Callable[[Reader], _Range]], _Request],
     return lambda reader: read(reader, _range_address)
 
 
-_PORT = Reach('', (Target.PORT,), lambda reader, partner: (Target.PORT,))
+def _port(take: Callable[[Reader], object]) -> Reach:
+    """Return the reach of a command to the port, whose parameters ``take`` reads."""
+    def find(reader: Reader, partner: Partner) -> Iterator[Target]:
+        take(reader)
+        yield Target.PORT
+
+    return Reach('', (Target.PORT,), find)
+
 
 # Commands of all families, or of several.
 _SHARED: dict[CommandCode, KnownCommand] = {
     (diagnostics.CMD, diagnostics.STATUS): KnownCommand(
         'diagnostic status', Effect.READS, Reader.end, lambda request: '', _identity_reply,
-        _PORT),
+        _port(Reader.end)),
     (diagnostics.CMD, diagnostics.READ_COUNTERS): KnownCommand(
         'read diagnostic counters', Effect.READS, diagnostics.ReadCounters.read,
         lambda request: f'at {request.address}, {counted(request.size, "byte")}',
-        _words_reply, _PORT),
+        _words_reply, _port(diagnostics.ReadCounters.read)),
     (word_range.CMD, word_range.WRITE): KnownCommand(
         'word range write', Effect.WRITES, _ranged(word_range.WordRangeWrite.read), _range_write,
         reach=range_targets.WRITE),
@@ -247,8 +254,9 @@ _SHARED: dict[CommandCode, KnownCommand] = {
 
 # All other commands (M 7-2, 7-3; 0F/94 is from practice); their parameters are given as bytes.
 _NAMED: dict[CommandCode, KnownCommand] = {
-    (0x06, 0x00): KnownCommand('echo', Effect.READS, reach=_PORT),
-    (0x06, 0x09): KnownCommand('read link parameters', Effect.READS, reach=_PORT),
+    (0x06, 0x00): KnownCommand('echo', Effect.READS, reach=_port(Reader.rest)),
+    (0x06, 0x09): KnownCommand(
+        'read link parameters', Effect.READS, reach=_port(diagnostics.ReadCounters.read)),
     (0x0F, 0x03): KnownCommand('file write', Effect.WRITES, reach=range_targets.WRITE),
     (0x0F, 0x29): KnownCommand('read section size', Effect.READS, reach=range_targets.SIZE),
     (0x0F, 0x94): KnownCommand('read file information', Effect.READS),

@@ -35,7 +35,7 @@ from abdf1_ros.pccc.plc5.commands import SystemAddress
 from abdf1_ros.pccc.plc5.targets import file_target
 from abdf1_ros.pccc.status import EXT_TOO_FEW_LEVELS, EXT_TOO_MANY_LEVELS
 from abdf1_ros.pccc.targets import Partner, Reach, Target
-from abdf1_ros.pccc.word_range.commands import WordBitWrite, WordRangeWrite
+from abdf1_ros.pccc.word_range.commands import WordBitWrite, WordRangeRead, WordRangeWrite
 
 # The data table of a PLC-3 (1779-KFM B-5); other contexts and sections do not exist. Of sections
 # 6, 10 and 12 (floats, high-order integers, pointers) the words are not described.
@@ -53,9 +53,8 @@ _Stretch = tuple[Any, int, int]
 
 
 def _read(reader: Reader, read_address: _ReadAddress) -> _Stretch:
-    """Read as far as the address: what follows changes nothing in what a read reads."""
-    reader.take(4)
-    return read_address(reader), 0, 0
+    request = WordRangeRead.read(reader, read_address)
+    return request.address, request.offset, (request.size + 1) // 2
 
 
 def _write(reader: Reader, read_address: _ReadAddress) -> _Stretch:
@@ -68,7 +67,9 @@ def _bit_write(reader: Reader, read_address: _ReadAddress) -> _Stretch:
 
 
 def _size(reader: Reader, read_address: _ReadAddress) -> _Stretch:
-    return read_address(reader), 0, 0
+    address = read_address(reader)
+    reader.end()
+    return address, 0, 0
 
 
 def _plc3_levels(reader: Reader) -> list[int]:

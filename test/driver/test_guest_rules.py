@@ -93,6 +93,11 @@ def needed(text: str, families: Sequence[str], told: Processor | None = None,
     (('SLC',), '0F 67 00 00 01 00 06 02 25 42 01 00', WRITE),
     ((), '0F 67 00 00 01 00 06 02 25 42 01 00', ALL),
     (('PLC5', 'SLC'), '0F 67 00 00 01 00 06 02 12 42 01 00', ALL),
+    # S:29, the number of the fault routine (CVE-2017-14469).
+    *((('SLC',), text, ALL) for text in (
+        '0F AA 02 02 84 1D 00 03 00', '0F AA 04 02 84 1C 00 00 00 03 00',
+        '0F A9 02 02 84 1D 03 00', '0F AB 02 02 84 1D 00 FF FF 03 00',
+        '0F 67 00 00 01 00 06 02 1D 42 03 00', '0F 00 00 00 01 00 06 02 1D 03 00')),
     # Read-modify-write N as the manual has it: the length of the masks after each address.
     (('PLC5',), '0F 79 01 06 07 00 02 FF FF 01 00', WRITE),
     (('PLC5',), '0F 79 02 06 07 00 04 FF FF FF FF 01 00 00 00 06 09 00 02 FF FF 01 00', WRITE),
@@ -116,12 +121,29 @@ def needed(text: str, families: Sequence[str], told: Processor | None = None,
       for code in (*range(0x82), *range(0x94, 256))),
     # What cannot be read.
     (('SLC',), '0F AA 02 07 89 00 00 11 22 33', ALL), (('SLC',), '0F AA 04 07 89 00 00 11', ALL),
-    (('SLC',), '0F A2 02 07', ALL), (('PLC5',), '0F 67 00 00 01 00 06 07 00 FF', ALL),
+    (('SLC',), '0F A2 02 07', ALL), (('SLC',), '0F A2 02 07 89 00 00 00', READ),  # it is padded
+    (('SLC',), '0F A2 02 07 89 00 00 01', ALL), (('PLC5',), '0F 29 06 07 00 01', ALL),
+    (('SLC',), '06 03 01', ALL), (('SLC',), '06 01 00 00 0A 01', ALL), (('SLC',), '06 09', ALL),
+    (('PLC5',), '0F 67 00 00 01 00 06 07 00 FF', ALL),
     (('PLC5',), '0F 02 06 07 00 01 00 01 00', ALL), (('PLC2',), '05 00 00 01', ALL)])
 def test_address_decides_and_rows_tell_its_family(
         entry: tuple[Sequence[str], str, ShareAccess]) -> None:
     families, text, right = entry
     assert needed(text, families) is right
+
+
+def test_no_other_command_needs_less_than_all_whatever_follows_it() -> None:
+    """What a manual does not name, as CVE-2021-33012 and CVE-2017-7924 are about."""
+    named = {0x06: bytes.fromhex('00 01 03 09'), 0x07: b'', 0x0F: bytes.fromhex(
+        '00 01 02 03 04 26 29 67 68 79 A1 A2 A9 AA AB')}
+    bodies = ('', '00', '02 07 89 00 00', '02 07 89 00 00 11 22', '00 00 01 00 06 07 00 02')
+    for body in bodies:
+        for cmd in set(range(256)) - {0, 1, 2, 5, 8, *named}:
+            if not cmd & 0x60:  # a priority command counts as any other, and a reply is none
+                assert needed(f'{cmd:02X} {body}', ('SLC',)) is ALL
+        for cmd, functions in named.items():
+            for function in set(range(256)) - {*functions}:
+                assert needed(f'{cmd:02X} {function:02X} {body}', ('SLC',)) is ALL
 
 
 @for_all('entry', [

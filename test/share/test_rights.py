@@ -143,9 +143,9 @@ COMMANDS: tuple[tuple[str, ShareAccess, str], ...] = (
     ('AA program, with priority', ALL, '2F AA 02 02 22 00 00 11 22'),
     ('PLC-2 unprotected write, with priority', WRITE, '28 00 00 01 02'),
     ('CMD with bit 7', ALL, '8F AA 02 02 22 00 00 11 22'),
-    ('A2 N7:0 and more', READ, '0F A2 02 07 89 00 00 DE AD'),
+    ('A2 N7:0 and more', ALL, '0F A2 02 07 89 00 00 DE AD'),
     ('A2 without address', ALL, '0F A2'),
-    ('PLC-2 unprotected read and more', READ, '01 00 00 02 AA BB CC DD'),
+    ('PLC-2 unprotected read and more', ALL, '01 00 00 02 AA BB CC DD'),
 )
 
 

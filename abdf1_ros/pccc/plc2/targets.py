@@ -26,7 +26,7 @@ from functools import partial
 
 from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.file_types import FileType, PlcType
-from abdf1_ros.pccc.plc2.commands import BasicBitWrite, BasicWrite
+from abdf1_ros.pccc.plc2.commands import BasicBitWrite, BasicRead, BasicWrite
 from abdf1_ros.pccc.targets import Partner, Reach, Target
 
 
@@ -41,6 +41,6 @@ def _reach(take: Callable[[Reader], object]) -> Reach:
     return Reach('PLC-2', (Target.DATA, Target.STATUS), partial(_targets, take))
 
 
-READ = _reach(Reader.word)
+READ = _reach(BasicRead.read)
 WRITE = _reach(BasicWrite.read)
 BIT_WRITE = _reach(BasicBitWrite.read)

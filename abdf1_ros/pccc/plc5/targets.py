@@ -27,7 +27,7 @@ from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.file_types import FileType
 from abdf1_ros.pccc.plc5.address import ADDRESSING
-from abdf1_ros.pccc.plc5.commands import ReadModifyWrite, SystemAddress, TypedWrite
+from abdf1_ros.pccc.plc5.commands import ReadModifyWrite, SystemAddress, TypedRead, TypedWrite
 from abdf1_ros.pccc.targets import in_status_file, Partner, Reach, Target
 
 _KINDS = (Target.DATA, Target.CLOCK, Target.STATUS, Target.OTHER)
@@ -45,9 +45,8 @@ def file_target(address: SystemAddress, offset: int, words: int, partner: Partne
 
 
 def _typed_read(reader: Reader, partner: Partner) -> Iterator[Target]:
-    """Read as far as the address: what follows changes nothing in what a read reads."""
-    reader.take(4)
-    yield file_target(SystemAddress.read(reader), 0, 0, partner)
+    request = TypedRead.read(reader)
+    yield file_target(request.address, request.offset, request.size, partner)
 
 
 def _typed_write(reader: Reader, partner: Partner) -> Iterator[Target]:

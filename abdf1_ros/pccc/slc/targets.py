@@ -65,9 +65,8 @@ def logical_target(address: LogicalAddress, size: int, partner: Partner) -> Targ
 
 
 def _read(is_short: bool, reader: Reader) -> _Place:
-    """Read as far as the address: what follows changes nothing in what a read reads."""
-    size = reader.byte()
-    return LogicalAddress.read(reader, is_short), size
+    request = slc.LogicalRead.read(reader, is_short)
+    return request.address, request.size
 
 
 def _write(is_short: bool, reader: Reader) -> _Place:
