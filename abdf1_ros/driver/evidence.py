@@ -28,15 +28,17 @@ class Evidence:
     What a line has shown of a station; as text: the cause and the cure, empty for none.
 
     - ``gateway``: the number of its gateway, None if the station is on the line itself.
+    - ``has_own_ack``: an ACK shows that the station is there. Otherwise a gateway sends it, or the
+      far end of a full-duplex line.
     - ``other_number``: the number to which its replies come in place of ours, None for ours.
-    - ``is_only_acknowledged``: the station has never replied. Its commands were acknowledged, but
-      the ACK was not its own: it came from a gateway, or from the far end of a full-duplex line.
+    - ``is_only_acknowledged``: its commands have had an ACK that is not its own, and no reply.
     """
 
     station: int
-    gateway: int | None = None
-    other_number: int | None = None
-    is_only_acknowledged: bool = False
+    gateway: int | None
+    has_own_ack: bool
+    other_number: int | None
+    is_only_acknowledged: bool
 
     def __str__(self) -> str:
         """Return the cause and the cure."""
@@ -60,7 +62,7 @@ def evidence_of(mode: LineMode, stations: ActiveStationList, number: int) -> Evi
     """Return what the line has shown of a station."""
     station, via = stations.records[number], stations.via(number)
     gateway = None if via == number else via
-    proves_nothing = mode.waits_for_acks and (mode.has_one_plc or gateway is not None)
+    has_own_ack = mode.is_master and gateway is None
     return Evidence(
-        number, gateway, stations.other_number(number),
-        proves_nothing and station.unanswered > 0 and not station.replies)
+        number, gateway, has_own_ack, stations.other_number(number),
+        mode.waits_for_acks and not has_own_ack and station.unanswered > 0 and not station.replies)
