@@ -58,13 +58,15 @@ MESSAGES: dict[Message, Cause] = {
         'A message arrived with a wrong CRC: noise, two stations with one address, or a PLC that '
         'sends BCC.',
         'If all messages are wrong: Error_Code, Parity and Data_Bits of both sides. If some are: '
-        'shield, ground, terminators, length of the cable, a lower baud rate.'),
+        'shield, ground, terminators, length of the cable, a lower baud rate. If always the same '
+        'rows are: flow control (XON/XOFF) or a telnet port of a device server.'),
     Message.ERR_BAD_BCC: Cause(
         'A message arrived with a wrong BCC: as with CRC, or a PLC that sends CRC.',
         'As for 2506. Prefer CRC on both sides: BCC does not find exchanged bytes.'),
     Message.ERR_COMMAND_TIMEOUT: Cause(
         'The PLC has acknowledged a command, but its reply did not come within Cmd_Timeout. It '
-        'is busy, its scan is long, or the station is a gateway that waits for another PLC.',
+        'is busy, its scan is long, or the station is a gateway that waits for another PLC. Or '
+        'each reply came with a wrong check: then 2506 or 2507 came, too.',
         'Compare with `plc ping`; raise Cmd_Timeout. In Mode Slave: is the master polling us, and '
         'does it pass messages on?'),
     Message.ERR_INACTIVE_STATION: Cause(

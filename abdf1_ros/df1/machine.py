@@ -164,6 +164,8 @@ _LONGEST = 2 * MAX_LINK_DATA
 # come.
 _LAST_CHARACTERS = 16
 
+_XON, _XOFF = b'\x11', b'\x13'
+
 # Responses: a full-duplex node sends them only after it has heard a message or an ENQ to its end.
 _RESPONSES = (Control.ACK, Control.NAK)
 
@@ -360,6 +362,7 @@ class Machine:
         """Take bytes from the line."""
         self.now = now
         self.counters.chars_received += len(data)
+        self.counters.flow_controls_received += data.count(_XON) + data.count(_XOFF)
         if self._forget_on_send and (self.sender.waiting or not self._is_listening):
             self._count(data)
             return  # these bytes came before our command left, so they cannot answer it

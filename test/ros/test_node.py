@@ -329,6 +329,16 @@ def test_stop_ends_all_threads_and_gives_the_port_back(make_bench: Benches) -> N
     speed.next()
 
 
+def test_bytes_that_come_are_judged_anew_at_each_opening_of_the_port(
+        make_bench: Benches, monkeypatch: pytest.MonkeyPatch) -> None:
+    session = make_bench(SPEED).node.session
+    opened: list[bool] = []
+    monkeypatch.setattr(session.diagnostics.line, 'port_opened', lambda: opened.append(True))
+    for state in (PortState(False, 'lost'), PortState(True, 'open')):
+        session.port_changed(state)
+    assert opened == [True]
+
+
 def test_end_is_not_taken_back_by_a_request(
         make_bench: Benches, monkeypatch: pytest.MonkeyPatch, capfd: Output) -> None:
     bench = make_bench(SPEED)

@@ -16,6 +16,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import count
 import time
 
 from abdf1_ros.driver.checks import StationHealth
@@ -24,7 +25,7 @@ from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity, Mode
 from abdf1_ros.pccc.processor import Processor
-from abdf1_ros.ros.diagnostics.line import LineView
+from abdf1_ros.ros.diagnostics.line import LineView, SWALLOWED
 from abdf1_ros.ros.diagnostics.stations import health_values, LinkCounterService, processor_fault
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
@@ -32,8 +33,9 @@ import pytest
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from std_srvs.srv import Trigger
 from support.cases import for_all
-from support.driver_bench import Recorder
+from support.driver_bench import DriverBench, Recorder
 from support.mappings import make_mapping
+from support.odd_device import OddDevice, Wiring
 from support.ros import Observer
 
 NOW = 1000.0
@@ -85,6 +87,64 @@ def test_plc_of_another_family_than_its_rows(
     if identity is not None:
         driver.checks.heard(1, identity, NOW)
     assert LineView(driver).wrong_type(1) == text
+
+
+MODES = pytest.mark.parametrize(('mode', 'wiring'), [
+    ('Master', Wiring.HALF), ('Peer', Wiring.FULL)])
+
+
+class Slc(OddDevice):
+    """An SLC that gives up a reply after three repetitions, its Message Retries."""
+
+    polls = 0
+
+    def _polled(self, station: int) -> None:
+        super()._polled(station)
+        self.polls = self.polls + 1 if self._polled_station is not None else 0
+        if self.polls > 3:
+            self._replies[station].popleft()
+            self.polls, self._polled_station = 0, None
+
+
+def line_to(device: OddDevice, mode: str) -> tuple[DriverBench, LineView]:
+    """Return a line with two rows, of which one has bytes 11 and 13 hex."""
+    device.words = {(1, 7, 0): 4321, (1, 9, 0): 0x1311}
+    rows = [make_mapping(f'N{file}:0', plc='SLC', period=200) for file in (7, 9)]
+    bench = DriverBench(rows, far=device, network=Network(mode=mode, baud=19200, timeout=300))
+    return bench, LineView(bench.driver)
+
+
+@MODES
+def test_flow_control_that_swallows_bytes_is_named(mode: str, wiring: Wiring) -> None:
+    device = Slc(wiring)
+    device.say = lambda data: data.translate(None, b'\x11\x13')
+    bench, line = line_to(device, mode)
+    assert line.evidence() == []
+    bench.run(250.0)
+    assert SWALLOWED in line.evidence()
+    line.port_opened()  # as after a cut of the connection
+    assert SWALLOWED not in line.evidence()
+    device.say = bytes
+    bench.run(250.0)
+    assert line.evidence() == []
+
+
+@MODES
+@pytest.mark.parametrize('is_one_row', [False, True])
+def test_other_damage_is_not_taken_for_flow_control(
+        mode: str, wiring: Wiring, is_one_row: bool) -> None:
+    device, numbers = Slc(wiring), count()
+
+    def say(data: bytes) -> bytes:
+        is_hit = b'\x11\x13' in data if is_one_row else next(numbers) % 9 == 0
+        return data[:-1] + bytes((data[-1] ^ 1,)) if is_hit and len(data) > 8 else data
+
+    device.say = say
+    bench, line = line_to(device, mode)
+    for _ in range(250):
+        bench.run(1.0)
+        assert SWALLOWED not in line.evidence()
+    assert bench.driver.counters.damaged_frames > 50
 
 
 def test_values_of_a_processor() -> None:

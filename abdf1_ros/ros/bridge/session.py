@@ -302,6 +302,8 @@ class BridgeSession:
             return  # the attempt has failed for the same reason as the last one
         self._port_text = state.text
         self._is_ours, self._opened = False, line_time()
+        if state.is_open:
+            self.diagnostics.line.port_opened()
         self._forget_connection()
         self.events.port_changed()
         self._publish_active()

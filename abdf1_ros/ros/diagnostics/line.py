@@ -18,8 +18,10 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
+from abdf1_ros.counters import Counters
 from abdf1_ros.df1.echo import COMES_BACK
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.stations import Station
@@ -33,6 +35,14 @@ from abdf1_ros.settings.mapping import Mapping
 
 # Another node with our number is reported until this many seconds after its last packet.
 _SAME_NUMBER_TOLD = 60.0
+
+# Commands, and messages that came, after which a missing byte means something: by then the low
+# byte of TNS has had each value.
+_ENOUGH = 256
+_ENOUGH_DAMAGED = 3
+
+SWALLOWED = ('messages have a wrong check, and no byte 11 or 13 hex has come: does flow control '
+             '(XON/XOFF) on the way, as of a device server, swallow them? Set it to none')
 
 # A station that takes no commands counts as silent after this time (s) without a sign of life.
 _HEARD_LATELY = 10.0
@@ -50,6 +60,11 @@ class LineView:
         self.link: LinkThread | None = None
         self.opener: PortOpener | None = None
         self._rows_by_kind = _rows_by_kind(driver.mappings)
+        self._before = Counters()  # what had been counted when the port was opened
+
+    def port_opened(self) -> None:
+        """Begin anew: another connection may pass other bytes."""
+        self._before = replace(self.driver.counters)
 
     def attach(self, link: LinkThread, opener: PortOpener) -> None:
         """Set the thread whose port is reported, and the opener of this port."""
@@ -96,7 +111,18 @@ class LineView:
     def evidence(self) -> list[str]:
         """Return what the line has shown of stations whose replies do not come, each text once."""
         found = map(self.evidence_of, self.driver.stations)
-        return [*dict.fromkeys(filter(None, found))]
+        return [*dict.fromkeys(filter(None, (*found, self._swallowed())))]
+
+    def _swallowed(self) -> str:
+        """Return a text if all that has come looks as if bytes 11 and 13 were taken out of it."""
+        counters, before = self.driver.counters, self._before
+        if counters.flow_controls_received > before.flow_controls_received:
+            return ''
+        damaged = counters.damaged_frames - before.damaged_frames
+        messages = damaged + counters.messages_received - before.messages_received
+        is_shown = damaged >= _ENOUGH_DAMAGED and min(
+            messages, counters.commands_sent - before.commands_sent) >= _ENOUGH
+        return SWALLOWED if is_shown else ''
 
     def evidence_of(self, station: Station) -> str:
         stations, number = self.driver.stations, station.number
