@@ -116,13 +116,13 @@ class GuestRules:
         station, has_all = self.station_of(command.dst), access is ShareAccess.ALL
         rows = limited(self._mappings, station)
         try:
-            check_floats(command)
             words = self._written(command, station) if rows else []
             if words is not None:
                 check_values(rows, [each for each in words if each.is_certain or not has_all])
             elif not has_all:
-                raise FormatError(f'{first([row.tag for row in rows])}: limits, and which words '
-                                  'it writes is not known')
+                raise FormatError(f'{first([row.tag for row in rows])}: limits hold there, and '
+                                  'the words of the command are unknown')
+            check_floats(command)
         except FormatError as error:
             return str(error)
         return ''

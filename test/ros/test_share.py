@@ -123,9 +123,9 @@ def test_write_that_may_be_to_words_of_the_bridge_is_told_with_its_rows() -> Non
         places.wrote(guest, file_write, Claim(1, words))
     assert (guest.collisions, told_by(notes)) == (2, [
         f'{text}, words of alive, a, b',
-        f'{text}, which words is not known: they may be those of alive, a, b'])
+        f'{text}, with unknown words, which may be those of alive, a, b'])
     places.wrote(guest, file_write, Claim(255, None))
-    assert told_by(notes)[-1].endswith('they may be those of alive, a, b, far')
+    assert told_by(notes)[-1].endswith('which may be those of alive, a, b, far')
 
 
 def test_first_command_that_only_all_allows_is_told_whatever_the_right_of_the_guest() -> None:
@@ -154,13 +154,17 @@ def test_first_value_outside_of_a_limit_is_told_with_tag_and_limit() -> None:
     row = make_mapping('F8:0', 'Write', plc='SLC', tag='speed', minimum=0.0, maximum=10.0)
     queue = DriverBench([row]).driver.guests
     places, notes = places_of()
-    guest = Guest('tcp:1', ShareAccess.WRITE, places)
-    for data in ('AA 04 08 8A 00 00 00 00 30 41', 'AA 04 08 8A 00 00 00 00 C0 7F'):
-        queue.put(GuestCommand(guest, Packet(1, 9, 15, 0, 7, bytes.fromhex(data)), 0.0, Mock()))
-    assert guest.outside == 2
-    assert told_by(notes) == [
-        'guest tcp:1: command refused: 0F/AA to station 1, protected typed logical write '
-        'F8:0 = 11; speed: value 11 at index 0 is outside Min 0, Max 10']
+    start = 'guest tcp:1: command refused: 0F/AA to station 1, protected typed logical write F8:'
+    for data, text in (
+            ('00 00 00 00 30 41', '0 = 11; speed: value 11 at index 0 is outside Min 0, Max 10'),
+            ('00 00 00 00 C0 7F', '0 = nan; speed: value nan at index 0 is not a valid float32'),
+            ('09 00 00 00 C0 7F', '9 = nan; value nan at index 0 is not a valid float32')):
+        guest = Guest('tcp:1', ShareAccess.WRITE, places)
+        for _ in range(2):
+            queue.put(GuestCommand(guest, Packet(1, 9, 15, 0, 7, bytes.fromhex(
+                f'AA 04 08 8A {data}')), 0.0, Mock()))
+        assert (guest.outside, told_by(notes)) == (2, [start + text])
+        notes.reset_mock()
 
 
 def test_internal_error_in_the_line_of_a_guest_is_told(monkeypatch: pytest.MonkeyPatch) -> None:

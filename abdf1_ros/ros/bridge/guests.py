@@ -83,7 +83,7 @@ class GuestPlaces(GuestListener):
         if rows:
             guest.collisions += 1
             what = 'words of' if claim.extents is not None \
-                else 'which words is not known: they may be those of'
+                else 'with unknown words, which may be those of'
             self._notes.warning(
                 f'writes of {guest.name}', f'guest {guest.name} has sent to station '
                 f'{claim.station}: {describe(command)}, {what} '
