@@ -74,7 +74,7 @@ def network_remarks(network: Network) -> Iterator[str]:
         yield 'Share_Access is for a line with Share; it has no effect without Share'
     yield from share_remarks(share_places(network.share))
     if network.share and network.share_access == 'All':
-        yield 'Share_Access All: guests may change modes, download and reset, too'
+        yield 'Share_Access All: guests may change programs, passwords, modes and settings, too'
 
 
 def _time_remarks(network: Network) -> Iterator[str]:

@@ -309,7 +309,7 @@ GOOD = Network(timeout=300)
       for access in ('Write', 'All')),
     (Network(share='pty:/tmp/hmi', share_access='Write'), []),
     (Network(share='pty:/tmp/hmi', share_access='All'), [
-        'Share_Access All: guests may change modes, download and reset, too']),
+        'Share_Access All: guests may change programs, passwords, modes and settings, too']),
     (Network(timeout=10_000), []),
     (Network(timeout=10_001), [
         'Timeout 10001 is in ms: the line stands still for 10 s whenever an answer gets lost'])])

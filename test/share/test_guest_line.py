@@ -26,6 +26,7 @@ import time
 from types import SimpleNamespace
 
 from abdf1_ros.cli.conform import main as conform
+from abdf1_ros.cli.plc.command import main as plc
 from abdf1_ros.client import Client
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
@@ -33,6 +34,8 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.guests import GuestCommand, GuestListener, GuestQueue
 from abdf1_ros.driver.settings import DriverSettings
+from abdf1_ros.pccc.families import parse_address
+from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.ports import endpoints
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.descriptor import NoClient, READ_SIZE
@@ -163,6 +166,22 @@ def test_place_is_a_peer_of_the_manual(tmp_path: Path, capsys: pytest.CaptureFix
     said = capsys.readouterr().out
     assert status == 0, said
     assert '0 failed' in said
+
+
+def test_files_are_listed_with_read_and_the_clock_is_set_with_write(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for access, is_set in ('Read', False), ('Write', True):
+        with shared(tmp_path, f'pty:{tmp_path}/hmi', access) as line:
+            line.plc.table.create(parse_address('S:0', PlcType.SLC), 66)
+            wait_for((tmp_path / 'hmi').exists)
+            port = ('1', '--port', str(tmp_path / 'hmi'), '--peer', '--timeout', '3000')
+            assert plc(['files', *port]) == 0
+            listed = [row.split() for row in capsys.readouterr().out.splitlines()]
+            assert listed == [[file, size, 'elements'] for file, size in (
+                ('S2', '66'), ('N7', '50'), ('N10', '20'))]
+            assert plc(['clock', *port, '--set', '--yes']) == (0 if is_set else 1)
+            assert any(stored(line.plc, 'S:37', 6)) is is_set
+            capsys.readouterr()
 
 
 def test_place_on_a_serial_device(tmp_path: Path) -> None:
