@@ -48,14 +48,16 @@ class LinkError(Abdf1Error):
     A transaction that ended without a reply.
 
     ``message`` is the numbered error, ``args`` fill its text. ``sent`` tells whether the
-    command has been on the line, so that it may have been executed.
+    command has been on the line, so that it may have been executed. ``cause`` is what was wrong
+    with the last try, None if the command was taken and nothing came.
     """
 
     message = Message.ERR_COMMAND_TIMEOUT
 
-    def __init__(self, *args: object, sent: bool = True) -> None:
+    def __init__(self, *args: object, sent: bool = True, cause: Message | None = None) -> None:
         super().__init__(*args)
         self.sent = sent
+        self.cause = cause
 
     def words(self) -> str:
         """Return the numbered text."""
@@ -71,9 +73,31 @@ class StationInactive(LinkError):
 
     message = Message.ERR_INACTIVE_STATION
 
-    def __init__(self, number: int, *, sent: bool = True) -> None:
-        super().__init__(number, sent=sent)
+    def __init__(self, number: int, *, sent: bool = True, cause: Message | None = None) -> None:
+        super().__init__(number, sent=sent, cause=cause)
         self.number = number
+
+
+_NOTHING_CAME = 'no reply though acknowledged'
+_NOT_WHOLE = {
+    None: _NOTHING_CAME,
+    Message.NTC_EOT_STX_EXPECTED: _NOTHING_CAME,
+    Message.ERR_COMMAND_TIMEOUT: 'no reply',
+    Message.NTC_ACK_EXPECTED: 'no command is acknowledged',
+    Message.ERR_RCVD_NAK_SYMBOL: 'NAK to each command',
+    Message.ERR_BAD_BCC: 'each reply has a wrong check',
+    Message.ERR_BAD_CRC: 'each reply has a wrong check',
+    Message.NTC_NO_ETX_RCVD: 'each reply breaks off',
+    Message.NTC_RCVD_MSG_TOO_SHORT: 'each reply is too short for a message',
+    Message.NTC_RCVD_MSG_TOO_LONG: 'each reply is too long for a message'}
+
+
+class NoWholeReply(LinkError):
+    """No whole reply came to the last tries of a command, though its station answers."""
+
+    def words(self) -> str:
+        """Return the reason; the specification has no number for it."""
+        return _NOT_WHOLE[self.cause]
 
 
 class WrongCommandCode(LinkError):
@@ -95,12 +119,10 @@ class NeverTaken(LinkError):
 
 
 class CommandExpired(LinkError):
-    """The command must not be sent any more, or repeated: it is too old, or for the argument."""
+    """The command was too old to be sent, or to be repeated."""
 
     def words(self) -> str:
         """Return this text; the specification has no number for it."""
-        if self.args:
-            return str(self.args[0])
         return 'too old to be sent once more' if self.sent else 'too old to be sent'
 
 

@@ -190,7 +190,8 @@ class Accounting(Tally):
         self.report(Event(Message.NTC_REPLY_MSG_RCVD, (number,), number))
         task.reply(reply)
 
-    def late(self, task: Task, *, keeps_others_waiting: bool) -> None:
+    def late(self, task: Task, *, keeps_others_waiting: bool,
+             cause: Message | None = None) -> None:
         """Count and report a reply that has not come within Cmd_Timeout (S0, counter 2545)."""
         self.counters.command_timeouts += 1
         number = task.command.dst
@@ -200,14 +201,17 @@ class Accounting(Tally):
                 station.overdue = MOST_OVERDUE if self._stations.is_new(number) \
                     else station.overdue + 1
             station.unanswered += 1
+            station.unanswered_by = cause
         self.note(Message.ERR_COMMAND_TIMEOUT, station=number)
 
-    def overdue(self, task: Task, *, keeps_others_waiting: bool) -> None:
+    def overdue(self, task: Task, *, keeps_others_waiting: bool,
+                cause: Message | None = None) -> None:
         """End a task whose reply has not come within Cmd_Timeout."""
-        self.late(task, keeps_others_waiting=keeps_others_waiting)
-        task.fail(CommandTimeout())
+        self.late(task, keeps_others_waiting=keeps_others_waiting, cause=cause)
+        task.fail(CommandTimeout(cause=cause))
 
-    def lost(self, number: int, now: float) -> None:
-        """Make a station inactive, and report it."""
+    def lost(self, number: int, now: float, cause: Message | None = None) -> None:
+        """Make a station inactive, and report it; ``cause`` is what was wrong with its answer."""
+        self._stations[number].unanswered_by = cause
         self._stations.lost(number, now)
         self.note(Message.ERR_INACTIVE_STATION, number, station=number)

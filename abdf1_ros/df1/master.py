@@ -40,7 +40,7 @@ from __future__ import annotations
 from collections.abc import Callable, Generator
 
 from abdf1_ros.df1 import frames
-from abdf1_ros.df1.frames import Frame
+from abdf1_ros.df1.frames import Control, Frame
 from abdf1_ros.df1.link import Link
 from abdf1_ros.df1.machine import Heard, Machine, Procedure, Rest, Send, Step
 from abdf1_ros.df1.master_line import MasterLine, MOST_QUEUED, poll_on_ack
@@ -50,7 +50,7 @@ from abdf1_ros.df1.settings import LinkSettings, PollingSettings
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task, TaskSource
 from abdf1_ros.errors import CommandExpired, CommandTimeout, StationInactive
-from abdf1_ros.messages import Event
+from abdf1_ros.messages import Event, Message
 
 
 class HalfDuplexMaster(Link):
@@ -96,16 +96,17 @@ class HalfDuplexMaster(Link):
             started = yield from self._line.deliver(
                 number, command, task.expires, poll_on_ack(number), task.answer_within)
             reply = command.reply() if number == BROADCAST else (
-                yield from self._collect(number, command, started, task.reply_size))
+                yield from self._collect(number, command, started, task.reply_size,
+                                         is_vain=not task.blames))
         except CommandExpired as error:
             task.sent = error.sent
             task.fail(error)
         except StationInactive as error:
             if task.blames:
-                self._line.accounting.lost(error.number, self._machine.now)
+                self._line.accounting.lost(error.number, self._machine.now, error.cause)
             task.fail(error)
         except CommandTimeout as error:
-            yield from self._give_up(task)
+            yield from self._give_up(task, error.cause)
             task.fail(error)
         else:
             if number == BROADCAST:
@@ -117,9 +118,10 @@ class HalfDuplexMaster(Link):
         """Poll for the reply to a command that was passed on (M 3-8)."""
         station = self._stations[command.dst]
         try:
-            reply = yield from self._collect(number, command, self._machine.now)
-        except StationInactive:  # the sender of the command has a time-out of its own
-            self._line.accounting.lost(number, self._machine.now)
+            reply = yield from self._collect(number, command, self._machine.now, is_vain=True)
+        except StationInactive as error:  # the sender of the command has a time-out of its own
+            if number not in self._line.faults:  # else it answers, and may reply to others
+                self._line.accounting.lost(number, self._machine.now, error.cause)
             return
         except CommandTimeout:
             station.overdue += 1
@@ -127,12 +129,25 @@ class HalfDuplexMaster(Link):
         station.overdue = 0
         self._line.take_unwanted(reply)
 
-    def _collect(self, number: int, command: Packet, started: float,
-                 reply_size: int = 0) -> Generator[Step, Heard, Packet]:
-        """Poll until the reply to ``command`` comes (S0, "Network Reads"; M 3-13..3-15)."""
+    def _collect(self, number: int, command: Packet, started: float, reply_size: int = 0, *,
+                 is_vain: bool = False) -> Generator[Step, Heard, Packet]:
+        """
+        Poll until the reply to ``command`` comes (S0, "Network Reads"; M 3-13..3-15).
+
+        A station that keeps a damaged reply would send it to the polls of the next command. So the
+        polls go on until the station gives it up, if the command ``is_vain``: its failure does not
+        make the station inactive.
+        """
         pause, passed_over = 0.0, 0
         while True:
-            answer = yield from self._line.poll_with_retries(number, pause, reply_size)
+            try:
+                answer = yield from self._line.poll_with_retries(number, pause, reply_size)
+            except StationInactive:
+                if self._is_over(started) or not is_vain or number not in self._line.faults:
+                    raise
+                continue
+            if is_vain and answer is Control.EOT and number in self._line.faults:
+                raise CommandTimeout(cause=self._line.faults[number])
             packet = None
             if isinstance(answer, Frame):
                 packet = yield from self._line.receive(number, answer)
@@ -143,13 +158,15 @@ class HalfDuplexMaster(Link):
             pause = self._settings.poll_pause
             passed_over += isinstance(answer, Frame)
             may_be_next = isinstance(answer, Frame) and passed_over <= MOST_QUEUED
-            is_over = self._machine.now - started >= self._settings.cmd_timeout
-            if is_over and not may_be_next:
-                raise CommandTimeout
+            if self._is_over(started) and not may_be_next:
+                raise CommandTimeout(cause=self._line.faults.get(number))
 
-    def _give_up(self, task: Task) -> Procedure:
+    def _is_over(self, started: float) -> bool:
+        return self._machine.now - started >= self._settings.cmd_timeout
+
+    def _give_up(self, task: Task, cause: Message | None) -> Procedure:
         """Count and report a reply that did not come in time (S0, counter 2545)."""
-        self._line.accounting.late(task, keeps_others_waiting=True)
+        self._line.accounting.late(task, keeps_others_waiting=True, cause=cause)
         if self._resets_slaves:
             self._line.counters.naks_sent += 1
             yield Send(frames.NAK)

@@ -110,10 +110,13 @@ class MasterLine:
         self._take_reply = take_reply
         self._timeout = answer_time(settings)
         self._last_code = 0
+        # What was wrong with the last message of each station since its last command.
+        self.faults: dict[int, Message] = {}
         self.begin()
 
     def begin(self) -> None:
         """Forget messages that wait to be passed on, and the last message of each station."""
+        self.faults.clear()
         self.forwards: deque[Packet] = deque()
         # Commands between slaves, whose replies are passed on as well.
         self._passed_on: deque[Packet] = deque(maxlen=_MOST_PASSED_ON)
@@ -136,6 +139,7 @@ class MasterLine:
         all retries. The wait for the answer of a silent station is ``answer_within`` s at most.
         """
         frame = frames.master_frame(number, packet.encode(), self.settings.checksum)
+        self.faults.pop(number, None)
         self.accounting.sent(packet)
         if number == BROADCAST:
             self.counters.messages_sent += 1
@@ -174,8 +178,9 @@ class MasterLine:
             self.accounting.given_up(self.settings.nak_retries, number)
         if gateway.active and len(self.stations.behind(number)) > 1:
             yield from self.probe(number)
-            raise CommandTimeout if packet.dst == number else StationInactive(packet.dst)
-        raise StationInactive(number)
+            raise CommandTimeout(cause=cause) if packet.dst == number \
+                else StationInactive(packet.dst, cause=cause)
+        raise StationInactive(number, cause=cause)
 
     def _note_cause(self, answer: Heard, number: int, expected: Message) -> Message:
         """Note why a frame has to be sent again, by default ``expected``; return the reason."""
@@ -229,7 +234,7 @@ class MasterLine:
                 self.note(Message.NTC_ENQ_RETRY, retry, cause.number, station=number)
         self.counters.enq_limit_exceeded += 1
         self.note(Message.NTC_ENQ_LIMIT_EXCEEDED, self.settings.enq_retries, station=number)
-        raise StationInactive(number)
+        raise StationInactive(number, cause=self.faults.get(number, cause))
 
     def _poll(self, number: int, pause: float = 0.0,
               reply_size: int = 0) -> Generator[Step, Heard, Heard]:
@@ -412,7 +417,7 @@ class MasterLine:
                 yield from self.deliver(number, packet)
             except (StationInactive, CommandTimeout) as error:
                 if isinstance(error, StationInactive):
-                    self.accounting.lost(error.number, self.machine.now)
+                    self.accounting.lost(error.number, self.machine.now, error.cause)
                 self._refuse(packet)
                 return None
             if collect is not None and not packet.is_reply and number != BROADCAST:
@@ -447,6 +452,7 @@ class MasterLine:
         """Count and report the fault of a frame; return the message that names it."""
         event = count_fault(frame, self.settings.checksum, self.counters, number)
         self.accounting.report(event)
+        self.faults[number] = event.message
         return event.message
 
 

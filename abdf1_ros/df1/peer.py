@@ -156,6 +156,7 @@ class FullDuplexPeer(EqualNode):
         self.replies: deque[Packet] = deque()
         self._outstanding: dict[tuple[int, int], Outstanding] = {}
         self._last_response = frames.NAK
+        self._undelivered_by: Message | None = None  # what was wrong with the last response
         self._accepted: _Accepted | None = None
         self._last_command: Packet | None = None
         self._unused: Packet | None = None
@@ -195,8 +196,8 @@ class FullDuplexPeer(EqualNode):
             entry.deadline = delivered + self._settings.cmd_timeout
         elif self._outstanding.pop(key, None):
             if task.blames:
-                self._accounting.lost(number, self._machine.now)
-            task.fail(StationInactive(number))
+                self._accounting.lost(number, self._machine.now, self._undelivered_by)
+            task.fail(StationInactive(number, cause=self._undelivered_by))
 
     def _send_reply(self, reply: Packet) -> Procedure:
         self._accounting.sent(reply)
@@ -224,6 +225,7 @@ class FullDuplexPeer(EqualNode):
                 break
             if response is Code.NAK:
                 naks += 1
+                self._undelivered_by = Message.ERR_RCVD_NAK_SYMBOL
                 self._accounting.nak_received(packet.dst)
                 if is_once or not self._note_nak(naks, packet.dst):
                     break
@@ -232,6 +234,7 @@ class FullDuplexPeer(EqualNode):
                 sending = message
             else:
                 enqs += 1
+                self._undelivered_by = Message.NTC_ACK_EXPECTED
                 if is_once or not self._note_silence(enqs, packet.dst):
                     break
                 sending = frames.ENQ
@@ -349,7 +352,10 @@ class FullDuplexPeer(EqualNode):
     def _message(self, frame: Frame) -> bytes:
         """Judge a message and return the response to it."""
         if frame.fault is not None:
-            self._accounting.report(count_fault(frame, self._settings.checksum, self._counters))
+            event = count_fault(frame, self._settings.checksum, self._counters)
+            self._accounting.report(event)
+            for entry in self._outstanding.values():
+                entry.cause = event.message
             is_given_up = frame.fault is FrameFault.NO_ETX and frame.received in (
                 Code.STX, Code.ENQ)  # its sender begins again, or sends an ENQ
             if is_given_up or frame.has_stopped:
@@ -430,7 +436,8 @@ class FullDuplexPeer(EqualNode):
         now = self._machine.now if begun is None else begun
         overdue = [key for key, entry in self._outstanding.items() if self._given_up(entry) <= now]
         for key in overdue:
-            self._accounting.overdue(self._outstanding.pop(key).task, keeps_others_waiting=True)
+            entry = self._outstanding.pop(key)
+            self._accounting.overdue(entry.task, keeps_others_waiting=True, cause=entry.cause)
 
     def _respond(self, response: bytes) -> bytes:
         self._last_response = response

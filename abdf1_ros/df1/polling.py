@@ -217,13 +217,15 @@ class StandardPollingMaster:
                 answer = yield from self._line.poll_with_retries(
                     number, 0.0, self._reply_size(number))
             except StationInactive as error:
-                # If a reply cannot be fetched, the commands of guests are given up first. The
-                # next poll shows whether the station answers.
-                guests = [station for station, entry in self._waiting_for(number)
-                          if not entry.task.blames]
-                for station in guests:
-                    self._end(station, error)
-                if not guests:
+                # If a reply cannot be fetched, commands that do not blame the station are given
+                # up first. The next poll shows whether the station answers. A damaged reply is
+                # polled for until the station gives it up, or the command is overdue.
+                vain = [(station, entry) for station, entry in self._waiting_for(number)
+                        if not entry.task.blames]
+                for station, entry in vain:
+                    if number not in self._line.faults or self._machine.now >= entry.deadline:
+                        self._end(station, error)
+                if not vain:
                     self._lost(number, begun, error)
                 return
             yield from self._answered(number, answer)
@@ -260,8 +262,10 @@ class StandardPollingMaster:
             return
         if packet is not None:
             self._line.take_unwanted(packet)
+        is_given_up = answer is Control.EOT and number in self._line.faults
         for station, entry in self._waiting_for(number):
-            if self._is_over(entry, isinstance(answer, Frame)):
+            if self._is_over(entry, isinstance(answer, Frame)) \
+                    or is_given_up and not entry.task.blames:
                 self._overdue(station)
 
     def _take_reply(self, number: int, packet: Packet) -> bool:
@@ -284,7 +288,8 @@ class StandardPollingMaster:
         via, now = self._stations.via(number), self._machine.now
         # Usually all other stations are polled meanwhile. They only wait behind a slow gateway.
         self._line.accounting.overdue(self._outstanding.pop(number).task,
-                                      keeps_others_waiting=now < self._slow_until[via])
+                                      keeps_others_waiting=now < self._slow_until[via],
+                                      cause=self._line.faults.get(via))
         behind = self._stations.behind(via)
         if sum(self._stations[other].unanswered > 0 for other in behind) > 1:
             self._slow_until[via] = now + _SLOW_TIME
@@ -374,7 +379,7 @@ class StandardPollingMaster:
 
     def _lost(self, number: int, begun: float, error: StationInactive) -> None:
         """Record that a station does not answer any more; it has had the line since ``begun``."""
-        self._line.accounting.lost(number, self._machine.now)
+        self._line.accounting.lost(number, self._machine.now, error.cause)
         for station in self._stations.behind(number):
             self._end(station, error)
         if number in self._unproven:

@@ -114,6 +114,7 @@ class _SentCommand:
 
     It has been sent ``tries`` times, of ``most``. It ``is_doubtful`` if another node with our
     number has asked the same station with the same TNS: a reply may then belong to either command.
+    ``cause`` is what was wrong with the last damaged packet that came meanwhile.
     """
 
     task: Task
@@ -121,6 +122,7 @@ class _SentCommand:
     tries: int = 0
     deadline: float = -math.inf
     is_doubtful: bool = False
+    cause: Message = Message.ERR_COMMAND_TIMEOUT
 
 
 class RadioNode(EqualNode):
@@ -229,8 +231,8 @@ class RadioNode(EqualNode):
             if self._stations[number].active:  # not after the one try of a probe
                 self._accounting.given_up(self._settings.nak_retries, number)
             if task.blames:
-                self._accounting.lost(number, self._machine.now)
-            task.fail(StationInactive(number))
+                self._accounting.lost(number, self._machine.now, command.cause)
+            task.fail(StationInactive(number, cause=command.cause))
             return
         try:
             yield from self._send(task.command.encode(), command)
@@ -306,7 +308,10 @@ class RadioNode(EqualNode):
             count_control(symbol, self._counters)
             return
         if symbol.fault is not None:
-            self._accounting.report(count_fault(symbol, self._settings.checksum, self._counters))
+            event = count_fault(symbol, self._settings.checksum, self._counters)
+            self._accounting.report(event)
+            for command in self._under_way.values():
+                command.cause = event.message
             return
         packet = Packet.decode(symbol.data)
         if packet.src in self._numbers:

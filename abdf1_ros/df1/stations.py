@@ -20,8 +20,10 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 import math
 
+from abdf1_ros.df1.odd import OddCommands
 from abdf1_ros.df1.packet import DIAGNOSTIC_REPLY, is_local_status, Packet
 from abdf1_ros.df1.probes import Asker, Probes
+from abdf1_ros.messages import Message
 
 MAX_STATION = 254
 
@@ -50,6 +52,7 @@ class Station:
     - ``has_gateway``: it is or was behind a gateway, which may hold commands; False if unknown.
     - ``replies_to_us``: it has replied to our number, and no gateway did so for it.
     - ``returns``: how often the station has become active again since its last reply to a command.
+    - ``unanswered_by``: what was wrong with its answer to the last command without a reply.
     """
 
     number: int
@@ -68,6 +71,7 @@ class Station:
     has_gateway: bool = False
     replies_to_us: bool = False
     returns: int = 0
+    unanswered_by: Message | None = None
 
     @property
     def replies_in_time(self) -> bool:
@@ -120,7 +124,8 @@ class ActiveStationList:
     ``records`` has the record of every station by number, whether it is in the list or not.
     ``routes`` gives the gateway to a station, by number: the gateway is polled in place of the
     station (M 3-7). While the gateway is inactive, all its stations are inactive. ``probes``
-    decides when silent stations may be asked. A probe takes ``probe_time`` seconds; if no station
+    decides when silent stations may be asked, ``odd`` when commands that fail while their station
+    replies to others. A probe takes ``probe_time`` seconds; if no station
     answers, ``rest`` seconds pass between two probes. ``took`` returns for how much of the time
     between two clock values (s) this process has run. ``on_gateway`` is called with the number of
     a station when a gateway has first replied for it.
@@ -134,6 +139,7 @@ class ActiveStationList:
                  on_gateway: Callable[[int], None] = lambda number: None) -> None:
         self._polled: set[int] = set()
         self.probes = Probes(probe_time, rest)
+        self.odd = OddCommands(lambda number: self.records[number].replies)
         self._took = took
         self.records = _Records()
         self._stations: dict[int, Station] = {}

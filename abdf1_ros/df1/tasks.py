@@ -23,6 +23,7 @@ from typing import Protocol
 
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import LinkError
+from abdf1_ros.messages import Message
 
 
 class Task(Protocol):
@@ -35,7 +36,8 @@ class Task(Protocol):
       it is unknown whether the command was executed.
     - ``reply_size``: bytes after the header of a good reply, 0 if unknown.
     - ``expires``: clock value (s) after which the command is neither sent nor repeated.
-    - ``blames``: a failure counts against the station. This is False for commands of guests.
+    - ``blames``: a failure counts against the station. This is False for commands of guests, and
+      for commands that failed before while the station replied to others.
     - ``is_own``: a heartbeat or a fallback, which no message has asked for. It is sent to an
       inactive station once, without a poll before it.
     - ``answer_within``: most seconds that the link waits for the answer of an inactive station.
@@ -64,6 +66,7 @@ class Outstanding:
     ``deadline`` is when the reply is overdue (clock value in s), counted from the delivery
     (``is_delivered``). Before the delivery, its value depends on the kind of link. ``passed_over``
     counts other messages that came in place of the reply. ``is_probe``: its station was inactive.
+    ``cause`` is what was wrong with a message that came meanwhile, None for nothing.
     """
 
     task: Task
@@ -71,6 +74,7 @@ class Outstanding:
     is_delivered: bool = False
     passed_over: int = 0
     is_probe: bool = False
+    cause: Message | None = None
 
 
 class TaskSource(Protocol):

@@ -43,6 +43,7 @@ from collections.abc import Container
 import math
 from operator import attrgetter
 
+from abdf1_ros.df1.probes import Probes
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.checks import Checks
 from abdf1_ros.driver.guests import GuestJob, GuestQueue
@@ -65,6 +66,11 @@ QUESTION_PERIOD = 1.0
 
 def _is_rewriting(job: Job) -> bool:
     return isinstance(job, WriteJob) and job.write.is_rewriting
+
+
+def _checks_from(turns: Probes, is_reads_turn: bool, now: float) -> float:
+    """Return from when on (clock value, s) a check may have one of the turns."""
+    return now + turns.pause if is_reads_turn and now >= turns.next else turns.next
 
 
 class _GuestShare:
@@ -125,14 +131,14 @@ class Agenda:
         self._tasks = tasks
         self._own_in_a_row = 0
         self._last_read: int | None = None  # the station of the last read between own writes
-        self._was_silent = False  # the station of the last own write
+        self._was_vain = False  # the last own write: its station is silent, or the row is odd
         self._questions = 0  # on a connection that has not been heard
         self._next_question = -math.inf  # after the quick questions (clock value in s)
         self._writes_in_a_row = 0
         self._has_begun_write = False
         self._last_check = -math.inf
         self._is_reads_turn = False  # after a check, or a fallback that was written again
-        self._last_probe_was_check = False
+        self._last_probe_was_check = self._last_odd_was_check = False
 
     def next(self, now: float, busy: Container[int] = ()) -> Job | None:  # noqa: A003
         """Return the next job for the line, None for none; stations in ``busy`` have to wait."""
@@ -178,7 +184,7 @@ class Agenda:
     def _own_first(self, now: float, busy: Container[int]) -> Job | None:
         """Return the next job: own writes first, not counted as ``writes`` in a row (rule 11)."""
         if self._interlocks.is_ending:  # no read has a turn now (rule 5)
-            self._own_in_a_row, self._was_silent = 0, False
+            self._own_in_a_row, self._was_vain = 0, False
         if self._own_in_a_row >= OWN_IN_A_ROW and not self._interlocks.is_beats_turn(now):
             if busy and self._last_read is not None and self._last_read not in busy:
                 # Stations take turns: with eight, the read might be for the same one each time.
@@ -189,12 +195,13 @@ class Agenda:
                 return job
         # Remaining packets of a long fallback go first: heartbeats that are always due would keep
         # them waiting. Where the fallback stands, heartbeats count and must not wait for it.
-        # A packet to a silent station takes a whole Timeout: a write to a living one goes between.
-        own: Job | None = self._was_silent and self._interlocks.next(
+        # A packet to a silent station takes a whole Timeout, and so does a packet of an odd row.
+        # So a write to a station that answers goes between.
+        own: Job | None = self._was_vain and self._interlocks.next(
             now, busy, only_active=True) or None
         own = own or self._tasks.continued(now, busy, self._interlocks.is_urgent)
-        if own is None and self._was_silent:  # after all packets of a try at a silent station
-            self._was_silent = False
+        if own is None and self._was_vain:  # after all packets of such a try
+            self._was_vain = False
             if job := self._check_or_read(now, busy):
                 return job
         own = own or self._interlocks.next(now, busy)
@@ -202,7 +209,8 @@ class Agenda:
         if own is None:
             return self._usual(now, busy)
         self._own_in_a_row += 1
-        self._was_silent = not self._stations[own.station].active
+        self._was_vain = not self._stations[own.station].active or self._stations.odd.is_suspect(
+            own.key, own.station)
         return own
 
     def _check_or_read(self, now: float, busy: Container[int]) -> Job | None:
@@ -283,12 +291,13 @@ class Agenda:
         if are_due and self._is_reads_turn:
             return None
         check = self._checks.next(
-            now, busy, self._probe_from(now),
+            now, busy, self._probe_from(now), self._odd_from(now),
             lambda check: not are_due or check.is_planned and not find_read(check.begun))
         if check is None:
             return None
         self._last_check, self._is_reads_turn = now, True
         self._last_probe_was_check |= check.is_probe
+        self._last_odd_was_check |= self._stations.odd.is_odd(check.key)
         if self._writes.waiting:
             self._writes_in_a_row = MAX_WRITES_IN_A_ROW
         return check
@@ -311,15 +320,21 @@ class Agenda:
 
         If reads of silent stations wait as well, checks and reads take turns.
         """
-        probes = self._stations.probes
-        is_reads_turn = self._last_probe_was_check and self._reads.has_silent
-        return now + probes.pause if is_reads_turn and now >= probes.next else probes.next
+        return _checks_from(
+            self._stations.probes, self._last_probe_was_check and self._reads.has_silent, now)
+
+    def _odd_from(self, now: float) -> float:
+        """Return the same for a check that fails while its station replies to others."""
+        return _checks_from(
+            self._stations.odd.turns, self._last_odd_was_check and self._reads.has_odd, now)
 
     def read(self, now: float, busy: Container[int]) -> Job | None:
         """Return a probe or read that is due."""
         job = self._reads.next(now, busy)
         if job is not None:
             self._last_probe_was_check &= not job.is_probe
+            if self._last_odd_was_check:
+                self._last_odd_was_check = not self._stations.odd.is_odd(job.key)
             self._is_reads_turn = False
             self._writes_in_a_row = self._own_in_a_row = 0
         return job

@@ -45,6 +45,9 @@ from abdf1_ros.pccc.steps import echo, identify
 # Seconds of silence after which a station gets an echo, and between two echoes.
 ECHO_PERIOD = 2.0
 
+# Seconds before a question that has failed is sent again, unless the station has replied since.
+_AGAIN = 2.0
+
 # If an active station with an unknown processor does not reply to a question, the next one is this
 # number of periods later. Questions that rows depend on are not delayed. Each such question costs
 # Cmd_Timeout, and in Mode Master mostly a DLE NAK.
@@ -72,7 +75,7 @@ class Check(Job):
 
     def __init__(self, checks: Checks, station: int, kind: CheckKind, period: float,
                  due: float = 0.0, *, is_planned: bool = False) -> None:
-        self.station, self.kind = station, kind
+        self.station, self.kind, self.key = station, kind, (station, kind)
         self.period, self.due = period, due
         self.is_planned = is_planned
         self.begun = -math.inf
@@ -195,17 +198,18 @@ class Checks:
         return now >= self.next_due
 
     def next(self, now: float, busy: Container[int], probe_from: float,  # noqa: A003
-             may_go: Callable[[Check], bool]) -> Check | None:
+             odd_from: float, may_go: Callable[[Check], bool]) -> Check | None:
         """
         Return the next check that is due and may be sent, None for none or if its station is busy.
 
-        It may be a probe from the clock value ``probe_from`` (s) on.
+        It may be a probe from the clock value ``probe_from`` (s) on. One that fails while its
+        station replies to others may be sent from ``odd_from`` on.
         """
         due = [check for check in self.jobs if check.due <= now]
         for check in filter(may_go, sorted(due, key=attrgetter('due'))):
             if check.station in busy:
                 return None  # no other check instead: the reads have their turn after each check
-            check.due = self._wanted_from(check, probe_from)
+            check.due = self._wanted_from(check, probe_from, odd_from)
             if check.due <= now:
                 check.due = math.inf
                 check.is_probe = not self._stations[check.station].replies_in_time
@@ -278,11 +282,17 @@ class Checks:
             check.due = self._line.now + check.period
         self._plan()
 
-    def _wanted_from(self, check: Check, probe_from: float) -> float:
+    def _wanted_from(self, check: Check, probe_from: float, odd_from: float) -> float:
         """Return the clock value (s) from which a check that is due wants the line."""
         station = self._stations[check.station]
         if not station.replies_in_time:
             return probe_from if station.active or check.kind is CheckKind.ECHO else math.inf
+        if self._stations.odd.is_odd(check.key):
+            return max(check.due, odd_from)
+        if self._stations.odd.is_doubtful(check.key, check.station):
+            # Its failure may have made the station inactive. Others go first, or it would do so
+            # again each time when the station comes back.
+            return max(check.due, check.begun + min(check.period, _AGAIN))
         if check.kind is CheckKind.ECHO and station.last_heard is not None:
             return station.last_heard + check.period
         return check.due

@@ -19,7 +19,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from abdf1_ros.df1.mode import LineMode
+from abdf1_ros.df1.odd import DAMAGED
 from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.errors import NoWholeReply
+from abdf1_ros.messages import Message
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,17 +31,17 @@ class Evidence:
     What a line has shown of a station; as text: the cause and the cure, empty for none.
 
     - ``gateway``: the number of its gateway, None if the station is on the line itself.
-    - ``has_own_ack``: an ACK shows that the station is there. Otherwise a gateway sends it, or the
-      far end of a full-duplex line.
     - ``other_number``: the number to which its replies come in place of ours, None for ours.
-    - ``is_only_acknowledged``: its commands have had an ACK that is not its own, and no reply.
+    - ``fault``: what is wrong with its replies, None if none of them has come.
+    - ``is_only_acknowledged``: the station has never replied. Its commands were acknowledged, but
+      the ACK was not its own: it came from a gateway, or from the far end of a full-duplex line.
     """
 
     station: int
-    gateway: int | None
-    has_own_ack: bool
-    other_number: int | None
-    is_only_acknowledged: bool
+    gateway: int | None = None
+    other_number: int | None = None
+    fault: Message | None = None
+    is_only_acknowledged: bool = False
 
     def __str__(self) -> str:
         """Return the cause and the cure."""
@@ -47,6 +50,9 @@ class Evidence:
             return (f'replies come to number {other}, not to ours: a gateway such as the 1770-KF2 '
                     f'and KF3 replies to its own number. Make it our Station: {other} in net.csv, '
                     f'or --own-station {other} of "plc"')
+        if self.fault is not None:
+            return (f'station {self.station} replies, but {NoWholeReply(cause=self.fault)}: does '
+                    'something on the way change bytes (flow control, a telnet port)?')
         if not self.is_only_acknowledged:
             return ''
         if self.gateway is not None:
@@ -62,7 +68,8 @@ def evidence_of(mode: LineMode, stations: ActiveStationList, number: int) -> Evi
     """Return what the line has shown of a station."""
     station, via = stations.records[number], stations.via(number)
     gateway = None if via == number else via
-    has_own_ack = mode.is_master and gateway is None
+    proves_nothing = mode.waits_for_acks and (mode.has_one_plc or gateway is not None)
+    fault = station.unanswered_by if station.unanswered_by in DAMAGED else None
     return Evidence(
-        number, gateway, has_own_ack, stations.other_number(number),
-        mode.waits_for_acks and not has_own_ack and station.unanswered > 0 and not station.replies)
+        number, gateway, stations.other_number(number), fault,
+        proves_nothing and station.unanswered > 0 and not station.replies)

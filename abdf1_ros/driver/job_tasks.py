@@ -22,13 +22,20 @@ error is raised in the generator.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Container
+from collections.abc import Callable, Container, Hashable
 from inspect import GEN_CLOSED, getgeneratorstate
 import math
 from typing import Protocol, TypeVar
 
+from abdf1_ros.df1.odd import OddCommands
 from abdf1_ros.df1.packet import BROADCAST, Packet
-from abdf1_ros.errors import Abdf1Error, CommandExpired, LinkError, StationInactive
+from abdf1_ros.df1.probes import Asker
+from abdf1_ros.errors import (
+    Abdf1Error,
+    CommandExpired,
+    LinkError,
+    StationInactive,
+)
 from abdf1_ros.pccc.describe import effect_of
 from abdf1_ros.pccc.dialect import Request, Steps
 from abdf1_ros.pccc.notation import Effect
@@ -60,9 +67,14 @@ class Job:
       also end expired jobs, so that their results are not late.
     - ``patience``: a later command expires this many seconds after the reply to the command
       before it, but not after ``latest`` (clock value in s). A pause of the process counts.
-    - ``why_stopped``: why no further command may be sent, empty if it may.
     - ``is_probe``: a silent station is asked whether it answers again.
     - ``is_own``: a heartbeat or a fallback, which no message has asked for.
+    - ``key``: what fails if the job fails again and again, None for nothing: see ``df1.odd``.
+    - ``is_suspect``: its station has replied to another command since the last one with this key
+      failed. So a failure does not blame the station.
+    - ``is_whole``: with the reply that has come the job is done; another packet would follow in a
+      turn of its own.
+    - ``asker``: as what a job that is odd has its turn.
     - ``blames``, ``answer_within``: see ``Task``.
     """
 
@@ -73,9 +85,12 @@ class Job:
     expires = math.inf
     patience = 0.0
     latest = math.inf
-    why_stopped = ''
     is_probe = False
     is_own = False
+    is_whole = True
+    key: Hashable = None
+    is_suspect = False
+    asker = Asker.IN_TURN
     blames = True
     answer_within = math.inf
     taken: float
@@ -93,6 +108,11 @@ class Job:
     def start(self, tasks: JobTasks, now: float) -> Job:
         """Begin, with the first command; return the job itself."""
         self.sent, self.taken = False, now
+        self._has_failed = False
+        if self.key is not None:
+            self.is_suspect = bool(tasks.odd.failed) and tasks.odd.is_suspect(
+                self.key, self.station)
+            self.blames = not self.is_suspect
         self._tasks, self._steps = tasks, self.steps(now)
         try:
             request = next(self._steps)
@@ -114,20 +134,37 @@ class Job:
         """Raise ``error`` in the steps, unless they have ended."""
         if getgeneratorstate(self._steps) == GEN_CLOSED:  # closed by the garbage collector
             return
-        if self.why_stopped and isinstance(error, CommandExpired):
-            error = CommandExpired(self.why_stopped)
         # A copy of the error for this job: a lost port fails all jobs with the same error.
-        self._advance(self._steps.throw, type(error)(*error.args, sent=self.sent))
+        found = type(error)(*error.args, sent=self.sent, cause=error.cause)
+        if self.key is not None:
+            found = self._tasks.odd.judge(self.key, self.station, found,
+                                          is_counted=not self._has_failed)
+            self._has_failed = True
+        self._advance(self._steps.throw, found)
+
+    def _settle(self) -> None:
+        """Record the end of the job for the jobs with the same key."""
+        if self.key is None:
+            return
+        odd, line = self._tasks.odd, self._tasks.line
+        if self.is_suspect:  # else it was a probe, or as good as any other
+            odd.ended(self.key, line.took(self.taken, line.now), line.now, self.asker)
+        if self.is_whole and not self._has_failed:
+            odd.passed(self.key)
 
     def _advance(self, resume: Callable[[_With], Request], what: _With) -> None:
         try:
             request = resume(what)
         except StopIteration:
             self._tasks.under_way.discard(self)
+            if self._tasks.odd.failed:
+                self._settle()
             self.ended(None)
             return
         except Exception as error:
             self._tasks.under_way.discard(self)
+            if self._tasks.odd.failed:
+                self._settle()
             self.ended(error)
             if not isinstance(error, Abdf1Error):
                 raise  # a bug
@@ -147,15 +184,17 @@ class JobTasks:
 
     - ``under_way``: all jobs; ``waiting``: the jobs whose next command waits to be sent.
     - ``station``: our own; ``first_tns``: the number before the first.
-    - ``line``: its clock.
+    - ``line``: its clock; ``odd``: the commands that fail while their station replies to others.
     - ``transactions``: number of replies.
     - ``is_heard``: a reply has come on this connection, or none is needed (rule 26).
     - ``next_expiry``: when the first waiting command expires (clock value in s), infinite for
       never.
     """
 
-    def __init__(self, station: int, first_tns: int, line: LineTime) -> None:
+    def __init__(self, station: int, first_tns: int, line: LineTime,
+                 odd: OddCommands | None = None) -> None:
         self.line = line
+        self.odd = OddCommands(lambda number: 0) if odd is None else odd
         self.transactions = 0
         self.is_heard = True
         self._station = station
@@ -200,17 +239,8 @@ class JobTasks:
             self._stop_waiting(job)
             job.fail(StationInactive(job.station))
 
-    def stop(self, is_meant: Callable[[Job], bool], why: str) -> None:
-        """Let jobs that are meant send no further command, for the reason ``why``."""
-        for job in filter(is_meant, self.under_way):
-            job.why_stopped, job.expires, job.latest = why, -math.inf, -math.inf
-        self._plan()
-
     def _stop_waiting(self, job: Job) -> None:
         self.waiting.remove(job)
-        self._plan()
-
-    def _plan(self) -> None:
         self.next_expiry = min((job.expires for job in self.waiting), default=math.inf)
 
     def fail(self, error: LinkError) -> None:

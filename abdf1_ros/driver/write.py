@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import NamedTuple
@@ -170,6 +170,11 @@ class Write:
                error: LinkError | RemoteError | None = None) -> WriteResult:
         """Return how this write ended, for all its messages."""
         return WriteResult(self.mapping, outcome, detail, self.value, error=error)
+
+
+def key_of(mapping: Mapping, *, is_own: bool) -> Hashable:
+    """Return what is odd if messages of a row, or our own writes of it, are never confirmed."""
+    return mapping, is_own
 
 
 def show(values: Sequence[float] | str) -> str:

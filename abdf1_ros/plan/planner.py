@@ -206,6 +206,11 @@ class Planner:
             self._limits[area].pop(other, None)
         return bool(wrong)
 
+    def forget(self, area: StationArea, span: Span) -> None:
+        """Forget that ``span`` was refused, and its shorter packets."""
+        self._refused[area].discard(span)
+        self._limits[area].pop(span, None)
+
     def dialect(self, mapping: Mapping) -> Dialect:
         """Return the dialect of the station of a mapping, as far as it is known."""
         processor = self.processors.get(mapping.station)

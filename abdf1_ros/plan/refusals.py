@@ -22,6 +22,11 @@ then it is tried in shorter ones. But a file may be missing for a moment, and be
 shorter packets are tried. So these count only if two searches in a row find them good. The planner
 keeps the result, and all mappings of the area are planned again: the good ones together, and never
 again with the bad ones.
+
+A block whose reply never arrives whole is divided in the same way. But a good read of a bad part
+proves nothing then, because the bytes that do not pass may come back. So parts stay apart until
+``forget``. If all parts are good, noise may have been the cause. So only the second search in a
+row with this result keeps them apart: they are too long together.
 """
 
 from __future__ import annotations
@@ -43,10 +48,12 @@ class Change:
 
 
 class _RefusalSearch:
-    """The search for the refused words of one block."""
+    """The search for the refused words of one block; with ``is_odd`` no station has refused."""
 
-    def __init__(self, block: Block) -> None:
+    def __init__(self, block: Block, *, is_odd: bool) -> None:
+        self.whole = block
         self.parts = [block]
+        self.is_odd = is_odd
         self._open = 1
         self._divided: list[tuple[Span, Span]] = []  # refused spans, and where each was divided
         self._refused: list[Span] = []
@@ -67,6 +74,11 @@ class _RefusalSearch:
         (self._refused if is_refused else self._good).append(block.span)
         self._open -= 1
         return self._open == 0
+
+    @property
+    def found_nothing(self) -> bool:
+        """Tell whether all parts are good."""
+        return not self._refused
 
     def gaps(self) -> list[Span]:
         """
@@ -90,26 +102,46 @@ class Refusals:
         self._planner = planner
         self._searches: dict[Block, _RefusalSearch] = {}
         self._shorter: set[Block] = set()  # in shorter packets, and found good by one search
+        self._odd: set[tuple[StationArea, Span]] = set()  # kept apart though no station refused
+        self._divided_in_vain: set[Block] = set()  # of such blocks all parts were good
         self.recovering: dict[StationArea, Block] = {}  # last recovered block of each area
 
-    def refused(self, block: Block, blocks: Iterable[Block]) -> Change | None:
+    def refused(self, block: Block, blocks: Iterable[Block], *,
+                is_odd: bool = False) -> Change | None:
         """
         Record that a station has refused a block; return None if it is to be read as before.
 
-        ``blocks`` are all blocks that are read.
+        ``blocks`` are all blocks that are read. With ``is_odd`` its reply never arrives whole.
         """
         search = self._searches.pop(block, None)
         halves = self._planner.split(block)
         if not halves:
             # Later plans keep it apart from good blocks, and in these packets, until it is good.
-            self._planner.refuse(block.station_area, block.span)
+            self._refuse(block.station_area, block.span, is_odd=is_odd)
             self._planner.shorten(block)
             return self._settle(search, block, blocks, is_refused=True) if search else None
-        search = search or _RefusalSearch(block)
+        search = search or _RefusalSearch(block, is_odd=is_odd)
         search.divide(block, halves)
         for half in halves:
             self._searches[half] = search
         return Change([block], halves)
+
+    def _refuse(self, area: StationArea, span: Span, *, is_odd: bool) -> None:
+        self._planner.refuse(area, span)
+        if is_odd:
+            self._odd.add((area, span))
+
+    def forget(self, blocks: Iterable[Block]) -> Change:
+        """Read again together what was divided because replies did not arrive whole."""
+        odd = {block: search for block, search in self._searches.items() if search.is_odd}
+        areas = {area for area, _ in self._odd} | {block.station_area for block in odd}
+        for area, span in self._odd:
+            self._planner.forget(area, span)
+        self._odd.clear()
+        self._divided_in_vain.clear()
+        for block in odd:
+            del self._searches[block]
+        return self._planned_anew(block for block in blocks if block.station_area in areas)
 
     def recovered(self, block: Block, blocks: Iterable[Block]) -> Change | None:
         """Record a good read after a bad one; ``blocks`` are all blocks that are read."""
@@ -120,9 +152,14 @@ class Refusals:
         if search is not None:
             if is_second:
                 self._planner.shorten(block)
+                if search.is_odd:
+                    self._odd.add((block.station_area, block.span))
             elif len(block.requests) > 1:
                 self._shorter.add(block)
             return self._settle(search, block, blocks, is_refused=False)
+        self._divided_in_vain.discard(block)
+        if (block.station_area, block.span) in self._odd:
+            return None
         if self._planner.allow(block.station_area, block.span):
             self.recovering[block.station_area] = block
         return None
@@ -161,8 +198,12 @@ class Refusals:
                 is_refused: bool) -> Change | None:
         if not search.settle(block, is_refused):
             return None
-        for gap in search.gaps():
-            self._planner.refuse(block.station_area, gap)
+        is_first = search.is_odd and search.found_nothing \
+            and search.whole not in self._divided_in_vain
+        if is_first:
+            self._divided_in_vain.add(search.whole)
+        for gap in () if is_first else search.gaps():
+            self._refuse(block.station_area, gap, is_odd=search.is_odd)
         return self._planned_anew(_of_the_area(block, blocks))
 
 

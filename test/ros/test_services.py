@@ -316,8 +316,7 @@ class StandIn:
     def read_now(self, row: Mapping, take: Callable[[ReadAnswer], None]) -> None:
         self.takes.append(take)
 
-    def take(self, topic: str, *message: object, is_call: bool) -> None:
-        assert is_call
+    def take(self, topic: str, *message: object) -> None:
         self.messages += message
 
 

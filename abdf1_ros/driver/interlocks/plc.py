@@ -28,10 +28,10 @@ from operator import attrgetter
 
 from abdf1_ros.df1.probes import OTHERS_SHARE
 from abdf1_ros.df1.stations import ActiveStationList
-from abdf1_ros.driver.interlocks.fallback import Crowd, FallbackCause, FallbackRow
+from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackRow
 from abdf1_ros.driver.interlocks.heartbeat import HeartbeatRow
 from abdf1_ros.driver.record import Claim, WriteRecord
-from abdf1_ros.driver.write import Outcome
+from abdf1_ros.driver.write import key_of, Outcome
 from abdf1_ros.settings.heartbeats import LEAST_REFRESH
 from abdf1_ros.settings.mapping import Mapping
 
@@ -64,8 +64,6 @@ class Conditions:
 
     - ``executor``: when the ROS executor ran last.
     - ``messages``: publication time of the last accepted message of each topic.
-    - ``crowds``: the last crowd of each topic of rows with Single_Publisher. The thread of the
-      callbacks sets it before it hands on a message that came since.
     - ``is_ending``: the bridge ends; ``ended``: when the end began, infinite before it.
     - ``gave_way``: when heartbeats last gave way to a fallback that stands.
     - ``is_beats_turn``: they have just given way to such a fallback, or to a read.
@@ -73,7 +71,6 @@ class Conditions:
 
     executor: float = -math.inf
     messages: dict[str, float] = field(default_factory=dict)
-    crowds: dict[str, Crowd] = field(default_factory=dict)
     is_ending: bool = False
     ended: float = math.inf
     gave_way: float = -math.inf
@@ -213,8 +210,24 @@ class Plc:
                 if not beat.wants_zero:
                     beat.due = beat.first_due
             beats = [beat for beat in beats if beat.wants_zero]
+        found: list[OwnRow] = [*beats, *(row for row in due if row not in held_up)]
+        for own in found:
+            own.due = max(own.due, self._again(own))
         self.plan()
-        return [*beats, *(row for row in due if row not in held_up)]
+        return [own for own in found if own.due <= now]
+
+    def _again(self, row: OwnRow) -> float:
+        """
+        Return from when on a row that is odd may be tried again (clock value, s; rule 29).
+
+        Answers to other writes do not end this pause, as they end the pause of the PLC. A count of
+        a heartbeat keeps to the share of odd rows.
+        """
+        odd = self._stations.odd
+        if not odd.failed or row.is_first_try or self._conditions.is_ending:
+            return -math.inf
+        is_count = isinstance(row, HeartbeatRow) and not row.wants_zero
+        return odd.next_own(key_of(row.mapping, is_own=True), OTHERS_SHARE if is_count else 0)
 
     def _why_held(self) -> str:
         """Return why no heartbeat may count, empty if they may (rules 3 b, 5)."""

@@ -86,6 +86,7 @@ class ReadJob(Job):
     - ``longest_read``: seconds within which all packets of a read have to come.
     - ``is_unfinished``: some packets of a read have come, but not all, or the last read was too
       old.
+    - ``is_whole``: its last packet has come.
     - ``ticket``: number of its valid entry in the queue, 0 for none.
     - ``take``: called at the end of each packet, with the words after the last packet of a read,
       or with the error.
@@ -94,7 +95,7 @@ class ReadJob(Job):
     def __init__(self, block: Block, points: Sequence[ReadPoint], line: LineTime,
                  take: Callable[[ReadJob, bytes | None, Exception | None], None],
                  longest_read: float) -> None:
-        self.block = block
+        self.block = self.key = block
         self.station = block.station
         self.extent = block.extent
         self.points = {point: block.slice_of(point.mapping) for point in points}
@@ -111,6 +112,10 @@ class ReadJob(Job):
         self._packets = _packet_reads(block)  # needed at every read, and always the same
         self._words: list[bytes] = []
         self.reply_size = self._packets[0].reply_size
+
+    @property
+    def is_whole(self) -> bool:  # type: ignore[override]
+        return len(self._words) == len(self._packets)
 
     def steps(self, now: float) -> Steps[None]:
         """Read one packet; raises LinkError, ReadTooOld, and the errors of ``words_in``."""

@@ -102,6 +102,10 @@ class ReadQueue:
         return [job for heap in self.heaps.values() for _, ticket, job in heap
                 if ticket == job.ticket]
 
+    def take_early(self, job: ReadJob, now: float) -> None:
+        """Remove a job that waits, as if it was due now."""
+        job.due, job.ticket = now, 0
+
     def take(self, now: float) -> ReadJob | None:
         """Remove and return the job that goes next, None where none is due."""
         heap = self._next_heap(now)

@@ -31,7 +31,14 @@ from abdf1_ros.driver.reads.silent import Reads
 from abdf1_ros.driver.record import WriteRecord
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import WriteResult
-from abdf1_ros.errors import CommandTimeout, FormatError, LinkError, RemoteError, StationInactive
+from abdf1_ros.errors import (
+    CommandTimeout,
+    FormatError,
+    LinkError,
+    NoWholeReply,
+    RemoteError,
+    StationInactive,
+)
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.status import is_address_fault
 from abdf1_ros.pccc.values import Values
@@ -107,6 +114,12 @@ class Readings:
         self._refusals = Refusals(self.planner)
         self.reads.replace((), map(self._job, blocks), 0.0)
 
+    def begin(self, now: float) -> None:
+        """Read all rows at once, and together what belongs together: the port has been opened."""
+        self._stations.odd.forget()
+        self._change(self._refusals.forget(self.blocks))
+        self.reads.begin(now)
+
     @property
     def blocks(self) -> list[Block]:
         """Return the blocks that are read again and again."""
@@ -169,7 +182,10 @@ class Readings:
             elif isinstance(error, ReadTooOld):
                 _fail_periodic(job.points, f'read again: {error}')
             elif isinstance(error, LinkError):
-                self.link_failed(job.station, error, job.points)
+                if isinstance(error, NoWholeReply):
+                    self._is_odd(job, error)
+                else:
+                    self.link_failed(job.station, error, job.points)
             elif isinstance(error, RemoteError):
                 self._stations[job.station].remote_errors += 1
                 self._failed(job, str(error), is_address_fault(error))
@@ -262,8 +278,16 @@ class Readings:
         if point.fail(reason):
             self._listener.unreadable(point.mapping, reason)
 
-    def _failed(self, job: ReadJob, reason: str, is_refusal: bool) -> None:
-        """Fail the points; after a refusal read smaller blocks."""
+    def _is_odd(self, job: ReadJob, error: LinkError) -> None:
+        """Fail the points of a reply that is never whole, and other points of a silent station."""
+        self._stations[job.station].failures += 1
+        _fail_periodic((point for point in self._affected(job.station, ())
+                        if point not in job.points), str(StationInactive(job.station)))
+        self._failed(job, str(error), is_refusal=True, is_odd=True)
+
+    def _failed(self, job: ReadJob, reason: str, is_refusal: bool, *,
+                is_odd: bool = False) -> None:
+        """Fail the points; read smaller blocks after a refusal, or if no reply is whole."""
         job.interrupted()
         if job.is_on_demand:
             if is_refusal and (shorter := self.planner.split(job.block)):
@@ -272,9 +296,13 @@ class Readings:
                 return
             is_refusal = False  # other rows are not read with it
         is_news = is_refusal and job in self.reads.jobs
-        change = self._refusals.refused(job.block, self.blocks) if is_news else None
+        change = self._refusals.refused(job.block, self.blocks, is_odd=is_odd) \
+            if is_news else None
         is_divided = change is not None and list(change.old) == [job.block]
-        for point in self._affected(job.station, job.points):
+        if is_odd and change is not None and is_divided:
+            self._stations.odd.divided(job.key, change.new)
+        points = job.points if is_odd else self._affected(job.station, job.points)
+        for point in points:
             if is_divided:
                 point.fail(f'{reason} (or another address read with it has this fault)')
             else:

@@ -16,7 +16,8 @@
 All reads of a line: waiting ones in the order of ``queue``, and reads that are set aside.
 
 The reads of a station are set aside while it is inactive, or while it acknowledges commands
-without replying in time. Now and then one of them is sent as a probe.
+without replying in time. Now and then one of them is sent as a probe. A read that fails while its
+station replies to others is odd: all these reads share a small part of the line.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Container, Iterable, Set
 import math
+from operator import attrgetter
 
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.reads.job import ReadJob
@@ -36,13 +38,15 @@ class Reads(WriteListener):
     """
     Keep all read jobs; ``stations.probes`` decides when a silent station may be read.
 
-    ``queue`` has the jobs that wait for their time, ``aside`` those of silent stations.
+    ``queue`` has the jobs that wait for their time, ``aside`` the jobs of silent stations. ``odd``
+    has the odd jobs that are due and wait for their turn, the first one due first.
     """
 
     def __init__(self, stations: ActiveStationList) -> None:
         self._stations = stations
         self.queue = ReadQueue()
         self.aside: dict[int, deque[ReadJob]] = {}
+        self.odd: deque[ReadJob] = deque()
         self._put_off = 0.0  # no probe before it: no station replies (clock value, s)
 
     @property
@@ -53,6 +57,11 @@ class Reads(WriteListener):
     def has_silent(self) -> bool:
         """Tell whether reads of silent stations wait for their probe."""
         return bool(self.aside)
+
+    @property
+    def has_odd(self) -> bool:
+        """Tell whether reads that fail while their station replies to others wait for a turn."""
+        return bool(self.odd)
 
     @property
     def poll_cycle(self) -> float | None:
@@ -68,7 +77,10 @@ class Reads(WriteListener):
 
     def replace(self, old: Iterable[ReadJob], new: Iterable[ReadJob], now: float) -> None:
         """Put ``new`` jobs, due at once, in the place of ``old`` ones."""
+        old = list(old)
         self.queue.replace(old, new, now)
+        for job in old:
+            self._stations.odd.passed(job.key)
 
     def want(self, job: ReadJob, now: float) -> None:
         """Make a read that a call has asked for due at once; add it if it is new."""
@@ -84,6 +96,7 @@ class Reads(WriteListener):
 
     def begin(self, now: float) -> None:
         """Make all reads due at once: the port has been opened."""
+        self.odd.clear()
         waiting = self.queue.jobs.difference(*self.aside.values())
         for job in sorted(waiting, key=lambda job: (job.due, job.ticket)):
             self.queue.put(job, now)
@@ -98,17 +111,26 @@ class Reads(WriteListener):
             self.find_due(now)  # a station may have become silent by another command
             if job := self._probe(now, busy):
                 return job
-        passed_over = []
+        if self.odd and (job := self._next_odd(now, busy)):
+            return job
+        passed_over, failed = [], self._stations.odd.failed
         while (job := self.queue.take(now)) is not None:
-            replies_in_time = self._stations.records[job.station].replies_in_time
-            if replies_in_time and job.station not in busy:
-                job.is_probe = False
+            is_usual = self._is_usual(job) if failed \
+                else self._stations.records[job.station].replies_in_time
+            if is_usual and job.station not in busy and not (failed and self._is_doubtful(job)):
                 break
             self.queue.undo_turn()
-            if replies_in_time:
+            if is_usual:
                 passed_over.append(job)
             else:
-                self._set_aside(job)
+                self._keep_back(job)
+        if job is None and (doubtful := next(
+                (job for job in passed_over if job.station not in busy), None)):
+            job = self._instead_of(doubtful, now)
+            if job is doubtful:
+                passed_over.remove(job)
+        if job is not None:
+            job.is_probe = False
         for other in passed_over:
             self.queue.put(other, other.due)
         return job
@@ -122,7 +144,7 @@ class Reads(WriteListener):
         passed_over, is_kept_waiting = [], False
         while (job := self.queue.take(due)) is not None:
             station = self._stations.records[job.station]
-            is_proven = station.replies > 0 and station.replies_in_time
+            is_proven = station.replies > 0 and self._is_usual(job)
             if is_proven and job.station not in busy:
                 job.is_probe = False
                 break
@@ -145,26 +167,82 @@ class Reads(WriteListener):
         if station is None:
             return None
         jobs = self.aside.pop(station)
-        job = jobs.popleft()
+        job = self._instead_of(min(jobs, key=self._failures), now)
+        if job in jobs:
+            jobs.remove(job)
         job.due, job.is_probe = now, True
         if jobs:
             # moved to the end, so that the next probe goes to another station
             self.aside[station] = jobs
         return job
 
+    def _next_odd(self, now: float, busy: Container[int]) -> ReadJob | None:
+        """Return the next read of those that are odd, None while none may be sent."""
+        for job in [job for job in self.odd
+                    if not self._stations.records[job.station].replies_in_time]:
+            self.odd.remove(job)
+            self._set_aside(job)
+        if now < self._stations.odd.turns.next:
+            return None
+        odd = next((job for job in self.odd if job.station not in busy), None)
+        if odd is None:
+            return None
+        job = self._instead_of(odd, now)
+        if job is odd:
+            self.odd.remove(job)
+        job.is_probe = False
+        return job
+
+    def _is_usual(self, job: ReadJob) -> bool:
+        """Tell whether a read that is due may be sent as usual."""
+        return self._stations.records[job.station].replies_in_time and (
+            job.is_unfinished or not self._stations.odd.is_odd(job.key))
+
+    def _failures(self, job: ReadJob) -> int:
+        return self._stations.odd.failures(job.key)
+
+    def _instead_of(self, job: ReadJob, now: float) -> ReadJob:
+        """
+        Return another read of the station, due or not, in the place of one that has failed.
+
+        It shows whether the station replies. Otherwise the read that fails could go first again
+        and again, and make the station inactive each time.
+        """
+        if not self._is_doubtful(job):
+            return job
+        others = [other for other in self.queue.waiting()
+                  if other.station == job.station and not self._failures(other)]
+        if not others:
+            return job
+        other = min(others, key=attrgetter('due'))
+        self.queue.take_early(other, now)
+        return other
+
+    def _is_doubtful(self, job: ReadJob) -> bool:
+        return self._stations.odd.is_doubtful(job.key, job.station)
+
+    def _keep_back(self, job: ReadJob) -> None:
+        """Keep a read that is not usual until its turn comes."""
+        if self._stations.records[job.station].replies_in_time:
+            self.odd.append(job)
+        else:
+            self._set_aside(job)
+
     def find_due(self, now: float) -> bool:
-        """Set reads of silent stations aside; return True if another read is due."""
+        """Keep reads back that are not usual; return True if another read is due."""
         while (job := self.queue.first(now)) is not None:
-            if self._stations[job.station].replies_in_time:
+            if self._is_usual(job):
                 return True
             self.queue.take(now)
             self.queue.undo_turn()
-            self._set_aside(job)
+            self._keep_back(job)
         return False
 
     def next_due(self) -> float:
         """Return when the next read or probe is due (clock value in s), infinite for never."""
         due = self.queue.next_due()
+        if self.odd:
+            due = min(due, self._stations.odd.turns.next)
         if all(map(self._stations.is_polled, self.aside)):
             return due
         return min(due, self._next_probe())

@@ -22,6 +22,7 @@ from abdf1_ros.errors import (
     CommandTimeout,
     FormatError,
     LinkError,
+    NoWholeReply,
     RemoteError,
     StationInactive,
 )
@@ -31,7 +32,7 @@ from abdf1_ros.pccc.status import check_status, STS_ILLEGAL_COMMAND
 from abdf1_ros.pccc.steps import data_of, written_before
 
 # After these errors a station may execute the next packet.
-_TAKEN_OR_NOT = RemoteError, CommandTimeout, StationInactive
+_TAKEN_OR_NOT = RemoteError, CommandTimeout, StationInactive, NoWholeReply
 
 REWRITTEN = ('by reading the word and writing it back; a change that the PLC made in between is '
              'lost')

@@ -29,7 +29,7 @@ import math
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.stations import ActiveStationList
-from abdf1_ros.driver.write import Origin, Outcome, Write, WriteResult
+from abdf1_ros.driver.write import key_of, Origin, Outcome, Write, WriteResult
 from abdf1_ros.driver.writes.under_way import WriteJob, WritesUnderWay
 from abdf1_ros.messages import Message
 from abdf1_ros.plan.bounds import CARRIED_WITHIN
@@ -46,8 +46,10 @@ class WriteQueue:
 
     Writes are in ``waiting``. ``report`` gets the results. ``tx_delay`` (s) passes before each
     transmission. A write to a silent station is a probe; if ``stations.probes`` does not admit it,
-    it ends unsent. ``next_expiry`` is when ``expire`` has work (clock value in s). ``leave_out``
-    returns why a write that would have the line now is not needed, empty if it is needed.
+    it ends unsent. So does a message of a row whose messages fail while the station replies to
+    others, if ``stations.odd`` does not admit it. ``next_expiry`` is when ``expire`` has work
+    (clock value in s). ``leave_out`` returns why a write that would have the line now is not
+    needed, empty if it is needed.
     """
 
     def __init__(self, stations: ActiveStationList, writing: WritesUnderWay, patience: float,
@@ -170,7 +172,8 @@ class WriteQueue:
 
     def expire(self, now: float) -> None:
         """End the writes and messages that must not be sent any more."""
-        if now < self.next_expiry and self._stations.all_reply_in_time:
+        stations = self._stations
+        if now < self.next_expiry and stations.all_reply_in_time and not stations.odd.failed:
             return
         self.next_expiry = math.inf
         for write in list(self.waiting):
@@ -226,9 +229,11 @@ class WriteQueue:
         """Return why a write must not be sent any more, empty if it may."""
         if reason := self.why_too_old(write, now):
             return reason
-        station = write.mapping.station
+        station, odd = write.mapping.station, self._stations.odd
         if self._stations.claim_message(station, now):
-            return ''
+            key = key_of(write.mapping, is_own=False)
+            is_early = odd.is_odd(key) and not odd.turns.claim_message(now)
+            return f'{odd.why(key)}; its turn has not come' if is_early else ''
         is_late = self._stations[station].active
         return (Message.ERR_COMMAND_TIMEOUT.entry() if is_late
                 else Message.ERR_INACTIVE_STATION.entry(station))

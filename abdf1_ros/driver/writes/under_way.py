@@ -25,7 +25,7 @@ from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.job_tasks import Job
 from abdf1_ros.driver.reads.readings import Readings
 from abdf1_ros.driver.record import Claim, WriteRecord
-from abdf1_ros.driver.write import Outcome, Write, WriteResult
+from abdf1_ros.driver.write import key_of, Outcome, Write, WriteResult
 from abdf1_ros.driver.writes.packets import carry_out
 from abdf1_ros.driver.writes.read_backs import ReadBacks
 from abdf1_ros.errors import CommandExpired, INTERNAL_ERROR, PortLost, RemoteError
@@ -49,6 +49,8 @@ class WriteJob(Job):
         self.write = write
         self.station = write.mapping.station
         self.is_own = write.is_own
+        self.key = key_of(write.mapping, is_own=write.is_own)
+        self.asker = Asker.OWN if write.is_own else Asker.MESSAGE
         self.expires, self.patience, self.latest = expires, patience, latest
         self.is_free = is_free
         self.answer_within = answer_within
@@ -66,11 +68,6 @@ class WriteJob(Job):
     def ended(self, error: Exception | None) -> None:
         """Report and record the result."""
         self._writing.ended(self)
-
-
-def is_message_of(row: Mapping, job: Job) -> bool:
-    """Tell whether a job writes a message of a row."""
-    return isinstance(job, WriteJob) and job.write.mapping is row and not job.is_own
 
 
 class WritesUnderWay:
@@ -104,7 +101,7 @@ class WritesUnderWay:
             self._tell(write, result)
         if station != BROADCAST and not (job.is_free and write.is_probe):
             self.stations.tried(station, job.claim.begun, self.line.now, was_silent=write.is_probe,
-                                asker=Asker.OWN if write.is_own else Asker.MESSAGE)
+                                asker=job.asker)
         if isinstance(result.error, RemoteError):
             self.stations[station].remote_errors += 1
         elif result.error is not None and not isinstance(result.error, CommandExpired):

@@ -139,7 +139,7 @@ class BridgeSession:
             TypeWatch(surroundings.graph, node.get_fully_qualified_name(),
                       node.resolve_topic_name, mappings),
             *watches_of(self.diagnostics.line, self.port, seen, self.guests.lines,
-                        configuration.files.changed, self.owners.look, self.owners.refusing,
+                        configuration.files.changed, self.owners.look,
                         surroundings.graph.dds.look)]
         self.link_counters = LinkCounterService(
             self.driver, self._wake_link, surroundings.wake_executor)

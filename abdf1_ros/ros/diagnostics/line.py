@@ -24,6 +24,7 @@ from pathlib import Path
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.echo import COMES_BACK
 from abdf1_ros.df1.frames import Duplex
+from abdf1_ros.df1.odd import DAMAGED
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.evidence import evidence_of
@@ -97,6 +98,18 @@ class LineView:
         return [station.number for station in self.driver.stations if self.is_deaf(station, now)]
 
     def is_deaf(self, station: Station, now: float) -> bool:
+        return self._comes_and_goes(station, now) and not self.is_garbled(station, now)
+
+    def garbled_stations(self, now: float) -> list[int]:
+        """Return the stations whose replies come, but none of them arrives whole."""
+        return [station.number for station in self.driver.stations
+                if self.is_garbled(station, now)]
+
+    def is_garbled(self, station: Station, now: float) -> bool:
+        return station.unanswered_by in DAMAGED and (
+            takes_in_silence(station) or self._comes_and_goes(station, now))
+
+    def _comes_and_goes(self, station: Station, now: float) -> bool:
         return (station.takes_no_commands and station.last_heard is not None
                 and now - station.last_heard < _HEARD_LATELY
                 and self.driver.network.line_mode.is_master)
@@ -126,7 +139,8 @@ class LineView:
 
     def evidence_of(self, station: Station) -> str:
         stations, number = self.driver.stations, station.number
-        if not takes_in_silence(station) and stations.other_number(number) is None:
+        if not takes_in_silence(station) and not station.takes_no_commands \
+                and stations.other_number(number) is None:
             return ''
         return str(evidence_of(self.driver.network.line_mode, stations, number))
 

@@ -74,11 +74,14 @@ class LinkStatus:
     def _judge_stations(self, now: float) -> Judgement:
         stations = [*self._line.driver.stations]
         total, active = len(stations), sum(station.active for station in stations)
-        if deaf := self._line.deaf_stations(now):
+        deaf, garbled = self._line.deaf_stations(now), self._line.garbled_stations(now)
+        if deaf or garbled:
             is_any_good = any(station.active and not takes_in_silence(station)
-                              and station.number not in deaf for station in stations)
+                              and station.number not in (*deaf, *garbled) for station in stations)
             return WARN if is_any_good else ERROR, (
-                f'port open, but {len(deaf)} of {total} stations answer polls and no command')
+                f'port open, but {len(deaf)} of {total} stations answer polls and no command'
+                if deaf else
+                f'port open, but no reply of {len(garbled)} of {total} stations arrives whole')
         if total and not active:
             if self._line.driver.overheard is not None:
                 return ERROR, f'port open, but none of {total} stations is heard'

@@ -71,6 +71,8 @@ class StationStatus:
         station, line = self._station, self._line
         if line.why_closed:
             return ERROR, f'station {station.number} unknown: the port is not open'
+        if line.is_garbled(station, now):
+            return WARN, line.evidence_of(station)
         if line.is_deaf(station, now):
             return WARN, deaf_text(station.number)
         if not station.active:

@@ -64,8 +64,6 @@ class Seen:
     """The reason why other programs cannot hear this process; empty if none is known."""
     crowded: Sequence[str] = ()
     """Topics with a Fallback and more than one publisher."""
-    refused: Mapping[str, str] = field(default_factory=dict)
-    """Topics with Single_Publisher and more than one publisher, with their names."""
     conflicts: dict[str, str] = field(default_factory=dict)
     """
     Text on the value that another program has written over a heartbeat, by tag of the heartbeat.

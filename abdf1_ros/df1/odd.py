@@ -1,0 +1,149 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Commands that get no whole reply although their station replies to others (rule 29).
+
+Some bytes never pass: a device server swallows 11 and 13 or doubles FF, a modem damages long
+messages. Then one read, write or question fails whenever it is sent. This is not a fault of its
+station, and must not take the line from its other commands.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Iterable
+from dataclasses import dataclass, replace
+import math
+
+from abdf1_ros.df1.probes import Asker, Probes
+from abdf1_ros.errors import CommandTimeout, LinkError, NoWholeReply, StationInactive
+from abdf1_ros.messages import Message
+
+# After this many failures in a row a command is odd: fewer are mostly noise.
+_ODD = 3
+
+# With these causes a reply came.
+DAMAGED = frozenset((
+    Message.ERR_BAD_BCC, Message.ERR_BAD_CRC, Message.NTC_NO_ETX_RCVD,
+    Message.NTC_RCVD_MSG_TOO_SHORT, Message.NTC_RCVD_MSG_TOO_LONG))
+
+# Shortest pause (s) before the next try of an odd 0 or fallback. It gets more than an eighth.
+_LEAST_PAUSE = 1.0
+
+
+@dataclass(slots=True)
+class _Failures:
+    """
+    The failures of a command in a row: ``count``, and the last ``error``.
+
+    ``replies`` is the number of replies of its station at the last failure. This failure ended at
+    ``when`` (clock value in s), after ``took`` seconds of the line.
+    """
+
+    error: LinkError
+    count: int = 0
+    replies: int = -1
+    when: float = -math.inf
+    took: float = 0.0
+
+
+class OddCommands:
+    """
+    The commands that have ``failed``, by any key, until they get a whole reply.
+
+    A failure counts if the station has replied to another command since the failure before, or if
+    a damaged reply came. After three failures in a row the command is odd. ``turns`` limits all
+    odd commands together to an eighth of the line's time. ``replies`` returns the number of
+    replies of a station.
+    """
+
+    def __init__(self, replies: Callable[[int], int]) -> None:
+        self.turns = Probes(0.0)
+        self._replies = replies
+        self.failed: dict[Hashable, _Failures] = {}
+
+    def failures(self, key: Hashable) -> int:
+        """Return how often a command has failed in a row, without failures of its station."""
+        found = self.failed.get(key)
+        return found.count if found else 0
+
+    def is_suspect(self, key: Hashable, station: int) -> bool:
+        """Tell whether the station has replied to another command since a command failed."""
+        found = self.failed.get(key)
+        return found is not None and self._replies(station) > found.replies
+
+    def is_doubtful(self, key: Hashable, station: int) -> bool:
+        """Tell whether a command has failed, and its station has replied to none since."""
+        found = self.failed.get(key)
+        return found is not None and self._replies(station) == found.replies
+
+    def is_odd(self, key: Hashable) -> bool:
+        """Tell whether a command has failed so often that the fault is its own."""
+        return self.failures(key) >= _ODD
+
+    def why(self, key: Hashable) -> str:
+        """Return why a command has failed last, empty if it has not."""
+        found = self.failed.get(key)
+        return str(found.error) if found else ''
+
+    def next_own(self, key: Hashable, share: int) -> float:
+        """
+        Return from when on (clock value, s) an own write may be tried again.
+
+        After a try that took t it waits ``share`` times t, and a second at least.
+        """
+        found = self.failed.get(key)
+        if found is None or found.count < _ODD:
+            return -math.inf
+        return found.when + max(_LEAST_PAUSE, share * found.took)
+
+    def judge(self, key: Hashable, station: int, error: LinkError, *,
+              is_counted: bool) -> LinkError:
+        """
+        Record that a command got no whole reply; return the error for its sender.
+
+        A failure ``is_counted`` once for all packets of a write.
+        """
+        if not isinstance(error, CommandTimeout | StationInactive) or not error.sent:
+            return error
+        replies = self._replies(station)
+        found = self.failed.setdefault(key, _Failures(error))
+        is_its_own = replies > found.replies or error.cause in DAMAGED
+        found.count += is_its_own and is_counted
+        if is_its_own and found.count >= _ODD:
+            error = NoWholeReply(cause=error.cause)
+        found.replies, found.error = replies, error
+        return error
+
+    def ended(self, key: Hashable, seconds: float, now: float, asker: Asker) -> None:
+        """Record that a command, good or not, has had the line for ``seconds`` until now."""
+        found = self.failed.get(key)
+        if found is not None and found.count >= _ODD:
+            found.when, found.took = now, seconds
+            if asker is not Asker.OWN:
+                self.turns.spent(seconds, now, asker)
+
+    def passed(self, key: Hashable) -> None:
+        """Forget the failures of a command: it got a whole reply, or is not sent any more."""
+        self.failed.pop(key, None)
+
+    def divided(self, key: Hashable, parts: Iterable[Hashable]) -> None:
+        """Let each part of a command be odd after one failure more."""
+        found = self.failed.pop(key)
+        for part in parts:
+            self.failed[part] = replace(found, count=_ODD - 1)
+
+    def forget(self) -> None:
+        """Forget all failures: the port is a new one."""
+        self.failed.clear()
