@@ -21,6 +21,7 @@ place may be a name.
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Iterable
 import csv
 import io
@@ -90,7 +91,7 @@ def anonymous_result(text: str) -> str:
         result = json.loads(text)
         cases = [{key: str(case[key]) for key in _CASE} for case in result['cases']]
         facts = {key: str(result[key]) for key in _RESULT if key in result}
-    except (ValueError, TypeError, KeyError, AttributeError):
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
         return _NO_RESULT
     known = {name: value for name, value in facts.items() if value.replace('.', '').isalnum()}
     return json.dumps({**known, 'cases': cases}, indent=1)
@@ -120,7 +121,7 @@ def _map_rows(rows: list[Row]) -> list[list[str]]:
     names = {column.name: column for column in MAP_COLUMNS}
     columns = [name for name in names if name in rows[0].columns
                and name in (*_KEPT, *_TAGS, *_TOPICS)]
-    numbers: dict[tuple[str, str], str] = {}
+    numbers: defaultdict[str, dict[str, str]] = defaultdict(dict)
     lines = [columns]
     for row in rows:
         cells = []
@@ -143,10 +144,10 @@ def _map_rows(rows: list[Row]) -> list[list[str]]:
     return lines
 
 
-def _number(numbers: dict[tuple[str, str], str], kind: str, name: str) -> str:
+def _number(numbers: dict[str, dict[str, str]], kind: str, name: str) -> str:
     """Return a text such as ``tag_1``, the same for the same name."""
-    known = sum(other == kind for other, _ in numbers)
-    return numbers.setdefault((kind, name.lower()), f'{kind}_{known + 1}')
+    names = numbers[kind]
+    return names.setdefault(name.lower(), f'{kind}_{len(names) + 1}')
 
 
 def _address(text: str, row: Row) -> str:

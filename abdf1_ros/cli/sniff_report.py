@@ -109,7 +109,7 @@ class ReportBundle:
     def write(self, path: str, summary: Summary, kind: LineKind) -> None:
         processors = [f'station {station}: {text}'
                       for station, text in sorted(self._processors.items())]
-        texts: dict[str, str | bytes] = {
+        texts: dict[str, str | Path] = {
             'summary.txt': '\n'.join(summary_lines(summary, kind)),
             'summary.json': summary_json(summary, kind),
             'processors.txt': '\n'.join(processors) or 'no diagnostic status was seen',
@@ -119,7 +119,7 @@ class ReportBundle:
         else:
             texts['entries.txt'] = '\n'.join(map(text_line, self._entries))
             for name in self.captures:
-                texts[_free_name('capture', name, texts)] = Path(name).read_bytes()
+                texts[_free_name('capture', name, texts)] = Path(name)
         for name in self.settings:
             given = name, _text(name)
             known, text = anonymous_settings(name) if self.is_anonymous else given
@@ -133,7 +133,10 @@ class ReportBundle:
             bundle.comment = _COMMENT
             bundle.writestr('README.txt', self._readme(texts))
             for name, content in texts.items():
-                bundle.writestr(name, content if isinstance(content, bytes) else f'{content}\n')
+                if isinstance(content, Path):  # it may be large
+                    bundle.write(content, name)
+                else:
+                    bundle.writestr(name, f'{content}\n')
 
     def _readme(self, names: Iterable[str]) -> str:
         lines = ['A report about a DF1 line, made by "sniff --report" of abdf1_ros.', '',

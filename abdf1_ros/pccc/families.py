@@ -34,6 +34,9 @@ from abdf1_ros.pccc.plc5 import FAMILY as PLC5
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.slc import FAMILY as SLC
 
+# The longest text of an address (characters); two ends of a range take far less.
+_LONGEST = 100
+
 FAMILIES: dict[PlcType, Family] = {family.plc_type: family for family in (PLC2, PLC3, PLC5, SLC)}
 
 
@@ -79,6 +82,8 @@ def parse_address(text: str, plc_type: PlcType, access: Access | None = None) ->
 def parse_range(text: str, plc_type: PlcType,
                 access: Access | None = None) -> Address | AddressRange:
     """Read the text of an address or of a range; raises what ``parse_address`` does."""
+    if len(text) > _LONGEST:
+        raise AddressSyntaxError(f'an address has at most {_LONGEST} characters')
     addressing = FAMILIES[plc_type].addressing
 
     def parse(part: str) -> Address:

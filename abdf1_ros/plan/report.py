@@ -24,7 +24,7 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import Enum
 import math
 
@@ -50,6 +50,7 @@ _HIGH_LOAD = 0.8
 _WORTH_SAVING = 0.05  # of the poll cycle
 _NAMED_TAGS = 3
 _LONG_TIMEOUT = 10_000  # ms
+_CROWD = 100  # rows of one word; 16 bits, each read, written and served, are 48
 
 PERIOD_STEPS = tuple(step * 10**power for power in (2, 3, 4) for step in (1, 2, 5))
 """The values of Period (ms) that we advise."""
@@ -82,7 +83,7 @@ class Report:
     The read plan of a line.
 
     ``default_period`` is for mappings without Period. ``response_time`` is the time of a station
-    for each answer. Both are in seconds.
+    for each answer, ``answer_time`` the time that the line waits for it. All are in seconds.
     """
 
     network: Network
@@ -90,6 +91,12 @@ class Report:
     blocks: tuple[Block, ...]
     default_period: float
     response_time: float
+    answer_time: float = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Find out how long the line waits for an answer."""
+        object.__setattr__(self, 'answer_time', forecast.answer_time(
+            self.network, self.blocks, self.response_time))
 
     @property
     def is_timed(self) -> bool:
@@ -99,28 +106,24 @@ class Report:
     @property
     def poll_cycle(self) -> float:
         """Return the seconds that it takes to read every block once."""
-        return forecast.poll_cycle(self.blocks, self._answer_time)
+        return forecast.poll_cycle(self.blocks, self.answer_time)
 
     @property
     def load(self) -> float:
         """Return the part of the line's time that the periods need."""
-        return forecast.load(self.blocks, self._answer_time) + sum(
+        return forecast.load(self.blocks, self.answer_time) + sum(
             own.seconds / own.period for own in self._own_work)
 
     def intervals(self) -> dict[Block, float]:
         """Return the expected seconds between two reads of each block."""
         return forecast.intervals(forecast.line_model(self.network), self.blocks, self._own_work,
-                                  self._answer_time)
+                                  self.answer_time)
 
     @property
     def _own_work(self) -> list[forecast.OwnCommand]:
         return bounds.own_work(
             forecast.line_model(self.network), self.mappings, self.default_period,
-            response_time=self._answer_time)
-
-    @property
-    def _answer_time(self) -> float:
-        return forecast.answer_time(self.network, self.blocks, self.response_time)
+            response_time=self.answer_time)
 
     @property
     def times(self) -> Times:
@@ -140,7 +143,7 @@ class Report:
 
     def time(self, block: Block) -> float:
         """Return the seconds that a block takes, answers included."""
-        return forecast.block_time(block, self._answer_time)
+        return forecast.block_time(block, self.answer_time)
 
     def needed_baud(self) -> int | None:
         """Return the lowest baud rate at which the line can keep all periods, or None."""
@@ -155,7 +158,7 @@ class Report:
 
         It is one of ``PERIOD_STEPS``. The periods then need at most ``_HIGH_LOAD`` of the time.
         """
-        others = self.load - forecast.load(self.blocks, self._answer_time)
+        others = self.load - forecast.load(self.blocks, self.answer_time)
         return next((period for period in PERIOD_STEPS if others + sum(
             self.time(block) / max(block.period, period / 1000) for block in self.blocks
             if block.period) <= _HIGH_LOAD), None)
@@ -262,14 +265,17 @@ def setting_remarks(network: Network, mappings: Sequence[Mapping]) -> Iterator[R
 
 def _overlap_remarks(mappings: Sequence[Mapping]) -> Iterator[Remark]:
     """Find Write rows that write words of Read rows, and words that several rows write."""
-    here: defaultdict[tuple[object, ...], list[Mapping]] = defaultdict(list)
+    here: defaultdict[tuple[object, ...], defaultdict[int, list[Mapping]]] = defaultdict(
+        lambda: defaultdict(list))
     for mapping in mappings:
-        for place in _places(mapping):
-            here[place].append(mapping)
+        for word in _words([mapping]):
+            here[_area(mapping)][word].append(mapping)
+    yield from _crowd_remarks(here.values())
     for mapping in mappings:
         if not mapping.writes:
             continue
-        others = dict.fromkeys(other for place in _places(mapping) for other in here[place]
+        words = here[_area(mapping)]
+        others = dict.fromkeys(other for word in _words([mapping]) for other in words[word]
                                if mapping.shares_words(other))
         read = [other for other in others if other.command is Command.READ]
         written = [other for other in others if other.writes and other.item < mapping.item]
@@ -285,6 +291,20 @@ def _overlap_remarks(mappings: Sequence[Mapping]) -> Iterator[Remark]:
                 'overwrites values of the other row'), mapping.station)
 
 
+def _crowd_remarks(areas: Iterable[dict[int, list[Mapping]]]) -> Iterator[Remark]:
+    """Find words that very many rows have, and take these rows out of the lists."""
+    for words in areas:
+        crowded = [word for word, rows in words.items() if len(rows) > _CROWD]
+        if not crowded:
+            continue
+        rows = words[crowded[0]]
+        yield Remark(RemarkKind.SETTING, (
+            f'{len(rows)} rows have the word {last_address(rows[0].address, crowded[0])}: '
+            f'{_tags(rows)}; they are too many to be compared with each other'), rows[0].station)
+        for word in crowded:
+            words[word].clear()
+
+
 def _case_remarks(mappings: Iterable[Mapping]) -> Iterator[Remark]:
     """Find tags that differ only in capital and small letters."""
     names: defaultdict[str, list[Mapping]] = defaultdict(list)
@@ -296,11 +316,8 @@ def _case_remarks(mappings: Iterable[Mapping]) -> Iterator[Remark]:
                 f'tags that differ only in capital and small letters: {_tags(group)}'))
 
 
-def _places(mapping: Mapping) -> Iterator[tuple[object, ...]]:
-    """Yield the words of a mapping, each with station and area."""
-    address = mapping.address
-    for number in range(mapping.codec.words):
-        yield mapping.serves, mapping.station, address.area, address.offset + number
+def _area(mapping: Mapping) -> tuple[object, ...]:
+    return mapping.serves, mapping.station, mapping.address.area
 
 
 def _row_order(block: Block) -> tuple[int, int]:
@@ -440,11 +457,12 @@ def _gap_remarks(report: Report) -> Iterator[Remark]:
     groups: defaultdict[tuple[StationArea, float], list[Block]] = defaultdict(list)
     for block in report.blocks:
         groups[block.station_area, block.period].append(block)
+    saving = _WORTH_SAVING * report.poll_cycle
     for blocks in groups.values():
         time = sum(map(report.time, blocks))
         least = _time_side_by_side(report, blocks)
         mappings = [mapping for block in blocks for mapping in block.mappings]
-        if len(mappings) > 1 and time - least >= _WORTH_SAVING * report.poll_cycle:
+        if len(mappings) > 1 and time - least >= saving:
             first, last = _ends(mappings)
             spare = sum(block.words for block in blocks) - len(_words(mappings))
             yield Remark(RemarkKind.GAP, (

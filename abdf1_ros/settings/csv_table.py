@@ -310,7 +310,8 @@ def _check_cells(place: Place, cells: list[str], names: list[str], columns: dict
     """Raise Problem where the cells of a row do not lie under the columns."""
     if cells[0].startswith('//'):
         raise Problem(place, 'a comment begins with #')
-    if len(columns) > 1 and [cell.lower() for cell in cells] == [name.lower() for name in names]:
+    if len(columns) > 1 and len(cells) == len(names) and all(
+            cell.lower() == name.lower() for cell, name in zip(cells, names, strict=True)):
         raise Problem(place, 'the names of the columns stand here again; once is enough')
     if len(cells) == 1 < len(columns) and any(sign in cells[0] for sign in _DELIMITERS):
         raise Problem(place, 'this row is one cell; its cells need a '

@@ -30,7 +30,13 @@ from abdf1_ros.settings.heartbeats import counts, READS_IN_TIME, RUN
 from abdf1_ros.settings.map_row import CellFault, RowReader
 from abdf1_ros.settings.mapping import Command, Mapping
 from abdf1_ros.settings.rows import Rows
+from abdf1_ros.settings.shared_words import SharedWords
 from abdf1_ros.text import shown
+
+# The largest map that was measured; each row is at least one topic.
+MOST_ROWS = 5000
+# The faults of a file for which a similar tag is looked for among all tags.
+_MOST_ADVICE = 20
 
 Clash = Callable[[str, Mapping, str], None]
 """Reports a conflict; its arguments are the column, the other row and the text of the fault."""
@@ -44,10 +50,14 @@ def load_mappings(path: str) -> tuple[Rows, list[Problem]]:
     """
     mappings: list[Mapping] = []
     table = read_table(path, COLUMNS, NEEDED, RENAMED)
+    if len(table.rows) > MOST_ROWS:
+        raise ConfigurationError([Problem(table.rows[MOST_ROWS].where(), (
+            f'a map has at most {MOST_ROWS} rows, this one has {len(table.rows)}; divide it '
+            'among several nodes, or read neighbouring words as one row with Length'))])
     problems = table.faults + table.row_faults
     clashes = _Clashes()
     kept: dict[int, Row] = {}
-    tags = [row.get('Tag') for row in table.rows]
+    tags = _Tags(row.get('Tag') for row in table.rows)
     for row in table.rows:
         reader = RowReader(row)
         mapping = reader.read()
@@ -74,6 +84,7 @@ def broken_links(mappings: Rows) -> Iterator[tuple[Mapping, CellFault]]:
     15).
     """
     tags = {mapping.tag: mapping for mapping in mappings}
+    known, topics_meant = _Tags(tags), _topics_meant(mappings)
     runs = {mapping.tag.upper(): mapping for mapping in mappings if mapping.tag.upper() == RUN}
     topics = {mapping.topic for mapping in mappings.messages}
     for mapping in mappings:
@@ -85,10 +96,10 @@ def broken_links(mappings: Rows) -> Iterator[tuple[Mapping, CellFault]]:
             if named and (text := _two_meanings(name, named, topics)):
                 yield mapping, CellFault('While', f'"{shown(name)}" {text}')
             elif mapping.is_heartbeat and name not in topics:
-                yield mapping, CellFault('While', _no_topic(name, mappings))
+                yield mapping, CellFault('While', _no_topic(name, topics_meant))
             elif mapping.is_guarded and not mapping.needs_run:
                 if named is None:
-                    yield mapping, CellFault('While', _no_tag(name, tags))
+                    yield mapping, CellFault('While', known.fault_of(name))
                 elif text := _no_counter(mapping, named, mappings):
                     yield mapping, CellFault('While', f'"{shown(name)}" {text}')
                 elif text := _too_rare(mapping, named):
@@ -96,21 +107,32 @@ def broken_links(mappings: Rows) -> Iterator[tuple[Mapping, CellFault]]:
 
 
 def _unknown_counter(row: Row, faults: Collection[CellFault],
-                     tags: Collection[str]) -> Iterator[CellFault]:
+                     tags: _Tags) -> Iterator[CellFault]:
     """Yield the fault of an unknown tag in While, for a row that has other faults, too."""
     name = row.get('While')
     is_read = row.get('Command').lower() == Command.READ.value.lower()
     if is_read and name and name.upper() != RUN and name not in tags and all(
             fault.column != 'While' for fault in faults):
-        yield CellFault('While', _no_tag(name, tags))
+        yield CellFault('While', tags.fault_of(name))
 
 
-def _no_tag(name: str, tags: Iterable[str]) -> str:
-    """Return the fault of a counter's tag that no row has, with the tag that may be meant."""
-    alike = {tag.lower(): tag for tag in tags}
-    close = difflib.get_close_matches(name.lower(), alike, 1)
-    meant = f'; did you mean {shown(alike[close[0]])}?' if close else ''
-    return f'should be RUN or the tag of one good Read row; "{shown(name)}" is neither{meant}'
+class _Tags:
+    """The tags of a map; similar tags are looked for a limited number of times."""
+
+    def __init__(self, tags: Iterable[str]) -> None:
+        self._tags = {*tags}
+        self._alike = {tag.lower(): tag for tag in self._tags}
+        self._left = _MOST_ADVICE
+
+    def __contains__(self, tag: str) -> bool:
+        return tag in self._tags
+
+    def fault_of(self, name: str) -> str:
+        """Return the fault of a counter's tag that no row has, and the tag that may be meant."""
+        self._left -= 1
+        close = difflib.get_close_matches(name.lower(), self._alike, 1) if self._left >= 0 else []
+        meant = f'; did you mean {shown(self._alike[close[0]])}?' if close else ''
+        return f'should be RUN or the tag of one good Read row; "{shown(name)}" is neither{meant}'
 
 
 def _two_meanings(name: str, row: Mapping, topics: Collection[str]) -> str:
@@ -132,16 +154,25 @@ def _too_rare(mapping: Mapping, counter: Mapping) -> str:
         f'Period of {shown(counter.tag)}'
 
 
-def _no_topic(topic: str, mappings: Rows) -> str:
+def _topics_meant(mappings: Rows) -> dict[str, str]:
+    """Return the topic that each wrong name may mean; empty for a topic that we publish."""
+    meant: dict[str, str] = {}
+    for row in mappings.messages:
+        for name in (row.tag, f'/{row.topic}', f'~/write/{row.topic}'):
+            meant.setdefault(name, row.topic)
+    return meant | {row.topic: '' for row in mappings}
+
+
+def _no_topic(topic: str, topics_meant: dict[str, str]) -> str:
     """Return why a heartbeat cannot require messages on ``topic``."""
     text = f'no good Write, ReadWrite or Serve row has the topic "{shown(topic)}"'
     if re.search('[,;|]', topic):
         return f'{text}; put spaces between topics'
-    if any(mapping.topic == topic for mapping in mappings):
-        return f'{text}: the bridge publishes it; name topics whose messages the bridge gets'
-    other = next((mapping for mapping in mappings.messages if topic in (
-        mapping.tag, f'/{mapping.topic}', f'~/write/{mapping.topic}')), None)
-    return f'{text}; did you mean {other.topic}?' if other else text
+    meant = topics_meant.get(topic)
+    if meant is None:
+        return text
+    return f'{text}; did you mean {meant}?' if meant \
+        else f'{text}: the bridge publishes it; name topics whose messages the bridge gets'
 
 
 def _no_confirmation(mapping: Mapping, tags: dict[str, Mapping], mappings: Rows) -> str:
@@ -187,7 +218,8 @@ class _Clashes:
         self._readers: dict[str, Mapping] = {}
         self._writers: dict[str, Mapping] = {}
         self._slcs: dict[int, Mapping] = {}
-        self._changing: list[Mapping] = []
+        self._changing = SharedWords()
+        self._alone = SharedWords()  # rows whose words belong to no other row
         self._routed: dict[int, Mapping] = {}
         self._gateways: dict[int, Mapping] = {}
 
@@ -222,7 +254,9 @@ class _Clashes:
         self._check_words(mapping, clash)
         if not faults:
             if mapping.changes:
-                self._changing.append(mapping)
+                self._changing.add(mapping)
+                if mapping.is_alone:
+                    self._alone.add(mapping)
             self._names[mapping.name] = mapping
             if not mapping.serves:
                 self._routed.setdefault(mapping.station, mapping)
@@ -254,12 +288,11 @@ class _Clashes:
 
     def _check_words(self, mapping: Mapping, clash: Clash) -> None:
         """Find another writer of words that only a heartbeat or a Fallback may write."""
-        for other in self._changing if mapping.changes else ():
-            if (mapping.is_alone or other.is_alone) and mapping.shares_words(other):
-                clash('Address', other, (
-                    'the words of a heartbeat or a Fallback belong to no other row; '
-                    f'{mapping.address}{_why_same(mapping, other)} shares words with the row'))
-                return
+        others = self._changing if mapping.is_alone else self._alone
+        if mapping.changes and (other := others.first(mapping)):
+            clash('Address', other, (
+                'the words of a heartbeat or a Fallback belong to no other row; '
+                f'{mapping.address}{_why_same(mapping, other)} shares words with the row'))
 
 
 def _why_same(mapping: Mapping, other: Mapping) -> str:

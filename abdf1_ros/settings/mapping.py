@@ -240,10 +240,18 @@ class Mapping:
         """
         if not self.extent.may_be_in(other.extent.station):
             return False
+        if self.extent.area == other.extent.area and Access.CIF not in (self.access, other.access):
+            return self._meets(other)
         # If the rows count words in different ways, it is unknown which words they share.
         return any(not mine.counts_like(theirs) or self._meets(other)
                    for mine in self._places() for theirs in other._places()
                    if mine.may_share_file(theirs))
+
+    def may_share_file(self, other: Mapping) -> bool:
+        """Tell whether words of both rows may be in one file, or slot, of one PLC."""
+        return self.extent.may_be_in(other.extent.station) and any(
+            mine.may_share_file(theirs)
+            for mine in self._places() for theirs in other._places())
 
     def _places(self) -> list[Address]:
         """Return an address in each file that may have the words."""

@@ -26,7 +26,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from gzip import BadGzipFile, GzipFile
 from io import BufferedReader
-from itertools import chain
+from itertools import chain, repeat
 from pathlib import Path
 import re
 from typing import BinaryIO, cast
@@ -50,7 +50,7 @@ _XXD = re.compile(r'(?P<offset>[0-9a-f]{6,}): (?P<bytes>\S.*?)(?:  .*)?', re.IGN
 _HEXDUMP = re.compile(r'(?P<offset>[0-9a-f]{7,})  (?P<bytes>[0-9a-f ]+)(?:\|.*)?', re.IGNORECASE)
 _WORDS = re.compile(r'(?P<offset>[0-9a-f]{7,})(?P<words>(?: +[0-9a-f]{4}){1,8})?', re.IGNORECASE)
 _REPEATED = '*'
-# Bytes that a dump may leave out: hours of the same byte on the fastest line.
+# Bytes that a dump may leave out, all together: hours of the same byte on the fastest line.
 _MOST_LEFT_OUT = 100_000_000
 
 
@@ -144,6 +144,7 @@ def read_hex(name: str, lines: Iterable[str]) -> Iterator[Chunk]:
     end = 0  # offset after the bytes of the last line that has an offset
     last = b''
     is_repeated = False
+    left_out = 0
     for number, text in enumerate(lines, 1):
         line = text.strip()
         if line == _REPEATED and last:
@@ -158,7 +159,12 @@ def read_hex(name: str, lines: Iterable[str]) -> Iterator[Chunk]:
             continue
         data = _bytes(match['bytes'], f'{name}:{number}') if match else b''
         if is_repeated and offset is not None:
-            yield from _repetition(last, offset - end, f'{name}:{number}')
+            left_out += (count := offset - end)
+            if not 0 <= count <= left_out <= _MOST_LEFT_OUT:
+                raise Problem(f'{name}:{number}', (
+                    f'the offset does not fit: "{_REPEATED}" stands for lines like the one above, '
+                    f'in a file for at most {_MOST_LEFT_OUT // 1_000_000} MB of them'))
+            yield from repeat(Chunk(None, Direction.UNKNOWN, last), count // len(last))
         is_repeated = False
         if match:
             end, last = (offset or 0) + len(data), data
@@ -170,30 +176,30 @@ def read_words(name: str, lines: Iterable[str]) -> Iterator[Chunk]:
     """
     Yield the chunks of a dump in words, whose offsets are hexadecimal or octal.
 
-    The last offset shows whether the last word has only one byte. Raises Problem if the offsets do
-    not fit.
+    The next offset shows whether the last word of a line has only one byte. Raises Problem if the
+    offsets do not fit.
     """
-    data, last = b'', b''
-    is_repeated = False
+    size, last = 0, b''  # the number of all bytes, and the bytes of the line before
+    is_first = True
     for number, line in enumerate(lines, 1):
         where, match = f'{name}:{number}', _WORDS.fullmatch(line.strip())
-        if line.strip() == _REPEATED and last:
-            is_repeated = True
-            continue
+        if line.strip() == _REPEATED and not is_first:
+            raise Problem(where, 'lines are left out here, and offsets of words may be octal; use '
+                                 '"hexdump -v" or "hexdump -C"')
         if match is None:
             raise Problem(where, f'"{line[:60]}" is not an offset and words as in those before')
         places = {int(match['offset'], base) for base in (8, 16)
                   if base == 16 or re.fullmatch('[0-7]+', match['offset'])}
-        if is_repeated:
-            raise Problem(where, 'lines are left out here, and offsets of words may be octal; use '
-                                 '"hexdump -v" or "hexdump -C"')
-        if not places & {len(data), len(data) - 1}:
-            raise Problem(where, f'the offset does not follow {len(data)} bytes')
-        if len(data) not in places:
-            data = data[:-1]
+        if not places & {size, size - bool(last)}:
+            raise Problem(where, f'the offset does not follow {size} bytes')
+        if size not in places:
+            size, last = size - 1, last[:-1]
+        if last:
+            yield Chunk(None, Direction.UNKNOWN, last)
         last = b''.join(bytes.fromhex(word)[::-1] for word in (match['words'] or '').split())
-        data += last
-    yield Chunk(None, Direction.UNKNOWN, data)
+        size, is_first = size + len(last), False
+    if last:
+        yield Chunk(None, Direction.UNKNOWN, last)
 
 
 def _of_log(log: LogReader, line: str, where: str) -> Iterator[Chunk]:
@@ -213,15 +219,6 @@ def _bare_offset(line: str, end: int, is_repeated: bool) -> int | None:
         return None
     offset = int(line, 16)
     return offset if is_repeated or offset == end else None
-
-
-def _repetition(data: bytes, count: int, where: str) -> Iterator[Chunk]:
-    """Yield the data of lines that a dump leaves out because they repeat the line before."""
-    if not 0 <= count <= _MOST_LEFT_OUT:
-        raise Problem(where, f'the offset does not fit: "{_REPEATED}" stands for lines like the '
-                             f'one above, at most {_MOST_LEFT_OUT // 1_000_000} MB of them')
-    for _ in range(count // len(data)):
-        yield Chunk(None, Direction.UNKNOWN, data)
 
 
 def _bytes(text: str, where: str) -> bytes:

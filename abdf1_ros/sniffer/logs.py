@@ -24,7 +24,6 @@ that fits the rule in two ways is refused, and so is a line of which bytes would
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
 import math
 import re
 
@@ -44,13 +43,15 @@ _OUT = {'tx', 'sent', 'send', 'sending', 'written', 'write', 'wrote', 'irp_mj_wr
 _IN = {'rx', 'received', 'receive', 'recv', 'receiving', 'read', 'irp_mj_read', 'in', '<', '<<',
        '<<<', '<-', '<--'}
 _WAYS = {**dict.fromkeys(_OUT, Direction.OUT), **dict.fromkeys(_IN, Direction.IN)}
-_WORD = re.compile(r'[A-Za-z_]+|-*>+|<+-*')
+_WORD = re.compile(r'[A-Za-z_]+|(?<!-)-+>+|>+|<+-*')
 
 # A line with only bytes: pairs, or groups of pairs, with the same sign between them.
 _PAIRS = re.compile(r'(?P<group>(?:[0-9A-Fa-f]{2})+)(?:(?P<sign>[ -])(?:[0-9A-Fa-f]{2})+'
                     r'(?:(?P=sign)(?:[0-9A-Fa-f]{2})+)*)?')
 _BYTE = r'(?:0[xX])?[0-9A-Fa-f]{2}'
 _AFTER = r'(?![0-9A-Za-z:=.])'
+# One byte, the signs after it, and the gap if they begin with one.
+_ONE = re.compile(r'(?:0[xX])?(?P<byte>[0-9A-Fa-f]{2})(?=(?P<gap>\s{2,}|\t)?)(?P<signs>[\s,;-]*)')
 # A run of bytes. It may include characters beside the bytes that look like more bytes.
 _BYTES = re.compile(rf'(?:^|(?<=[\s,\[({{"\'])){_BYTE}(?:[\s,;-]+{_BYTE})*{_AFTER}')
 _GAP = re.compile(r'\s{2,}|\t')
@@ -62,7 +63,7 @@ _LEFT_OVER = re.compile(
     rf'(?<![\w=(\[.#])(?:0[xX]|\\x)?(?:{_HEX})'
     r'(?![\w=)]|:(?:\s|$)| bytes?\b| *\||\.\d+(?![\w.])|(?<=\w{4})(?:\s{2}|\t))|\bb[\'"]')
 _GLUED = re.compile(r'(?:[0-9A-Fa-f]{2})+(?=[\s,;-]|$)')
-_LITERAL = re.compile(r'\bb(?P<sign>[\'"])(?:\\.|(?!(?P=sign)).)*(?P=sign)')
+_LITERAL = re.compile(r'\bb(?P<sign>[\'"])(?:\\.|(?!(?P=sign))[^\\])*(?P=sign)')
 
 
 class LogReader:
@@ -146,24 +147,38 @@ def _divided(line: str) -> tuple[str, bytes]:
 
 def _bytes_of(line: str, match: re.Match[str]) -> bytes:
     """Return the bytes of a run, without the characters beside them."""
-    for text, others in _splits(line, match.start()):
-        data = bytes.fromhex(re.sub('0x|[,;-]', ' ', text, flags=re.IGNORECASE))
-        if _are_characters(others, data):
-            return data
+    data = _beside_characters(line.rstrip(' '), match.start())
+    if data is not None:
+        return data
     if _REST.fullmatch(line, match.end()):
         return bytes.fromhex(re.sub('0x|[,;-]', ' ', match[0], flags=re.IGNORECASE))
     raise ValueError
 
 
-def _splits(line: str, start: int) -> Iterator[tuple[str, str]]:
-    """Yield the ways to divide a line into bytes and characters: at each gap."""
-    for gap in _GAP.finditer(line, start):
-        text = line[start:gap.start()]
-        if re.fullmatch(rf'{_BYTE}(?:[\s,;-]+{_BYTE})*', text):
-            yield text, line[gap.end():]
+def _beside_characters(line: str, start: int) -> bytes | None:
+    """
+    Return the bytes from ``start`` to a gap, where the same bytes follow it as characters.
+
+    As many characters have to follow as bytes come before, so no two gaps are possible.
+    """
+    data = bytearray()
+    first = last = 0  # the bytes without blanks at their ends, which may be missing
+    while match := _ONE.match(line, start):
+        start = match.end()
+        data += bytes.fromhex(match['byte'])
+        if data[-1:] != b' ':
+            last = len(data)
+        elif not last:
+            first = len(data)
+        if match['gap'] and len(line) - match.end('gap') == last - first:
+            text = line[match.end('gap'):]
+            return bytes(data) if _are_characters(text, data) else None
+        if not match['signs']:
+            break
+    return None
 
 
-def _are_characters(text: str, data: bytes) -> bool:
+def _are_characters(text: str, data: bytes | bytearray) -> bool:
     """Return True if a text can show ``data`` in a dump, with signs for unprintable bytes."""
     text, data = text.strip(' '), data.strip(b' ')  # blanks at the ends may be missing
     return len(text) == len(data) > 0 and all(

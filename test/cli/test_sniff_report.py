@@ -169,6 +169,14 @@ def test_anonymous_bundle_has_no_name_of_a_host_user_path_or_port(
     assert found['conformance/1_result.json'].startswith('left out: ')
 
 
+def test_result_of_brackets_alone_is_left_out(tmp_path: Path, capture: str) -> None:
+    report, result = tmp_path / 'report.zip', tmp_path / 'result.json'
+    result.write_text(200_000 * '[')
+    assert main([capture, '--summary', '--report', str(report), '--anonymous',
+                 '--conformance', str(result)]) == 0
+    assert unpacked(report)['conformance/result.json'].startswith('left out: ')
+
+
 def test_processor_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str],
                             monkeypatch: pytest.MonkeyPatch) -> None:
     asked, told = pair('diag_status_slc504')

@@ -79,6 +79,17 @@ def texts(report: Report, kind: RemarkKind) -> list[str]:
     return [remark.text for remark in report.remarks() if remark.kind is kind]
 
 
+def test_words_that_very_many_rows_have_are_one_remark() -> None:
+    rows = [make_mapping('N7:4', 'Write', tag=f't{number}', item=number, length=2)
+            for number in range(101)]
+    told = texts(report_of(*rows[1:]), RemarkKind.SETTING)
+    assert len(told) == 99 and told[-1].startswith(
+        'map.csv:101: t100 writes N7:4, of which t1, t2, t3 and 96 more also writes')
+    assert texts(report_of(*rows), RemarkKind.SETTING) == [
+        '101 rows have the word N7:4: t0, t1, t2 and 98 more; they are too many to be compared '
+        'with each other']
+
+
 @for_all(('plc', 'settings', 'line_time'), [
     ('PLC5', {}, TWO_WORDS), ('SLC', {}, TWO_WORDS_SLC), ('PLC5', {'mode': 'Peer'}, FULL_DUPLEX),
     ('PLC5', {'baud': 19200}, TWO_WORDS / 2), ('PLC5', {'tx_delay': 5}, TWO_WORDS + 0.015),

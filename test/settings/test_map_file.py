@@ -25,6 +25,7 @@ from abdf1_ros.pccc.families import dialect_of, parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.values import ValueType, WordOrder
+from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.columns import COLUMNS
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Command, Publish
@@ -319,14 +320,14 @@ LONG = 'x' * 5000
     ({'Command': LONG}, 'Command = "{}" should be one of Read'),
     ({'Station': LONG}, 'Item: 1, Station = "{}" should'),
     ({'PLC_Type': LONG}, 'PLC Type ({}) should be one of PLC2'),
-    ({'Address': LONG}, 'Invalid Address Syntax ({}); write type'),
+    ({'Address': LONG}, 'Invalid Address Syntax ({}); an address has at most 100'),
     ({'Command': 'Write', 'Fallback': LONG, 'Fallback_After': '500'}, '"{}"'),
     ({'Command': 'Write', 'Fallback': '0', 'Fallback_After': LONG}, '"{}"'),
     ({'Command': 'Read', 'While': LONG}, '"{}"'),
     ({'Command': 'Heartbeat', 'While': 'a', 'While_Timeout': '9' * 5000}, f'"{100 * "9"}..."'),
     # In advice, too.
     ({'Length': "'" + '9' * 5000}, ''), ({'Min': f'"{"1" * 5000},000"'}, ''),
-    ({'Address': f'T4:0.{LONG}'}, '')])
+    ({'Address': f'T4:0.{80 * "x"}'}, '')])
 def test_long_cell_is_shown_without_its_end(cells: dict[str, str], text: str) -> None:
     told = faults(row(**cells))
     assert text.format('x' * 100 + '...') in told[0]
@@ -550,3 +551,21 @@ def test_length_beside_a_range_agrees_with_it() -> None:
         '2:3 (Address): Item: 1, a heartbeat is one word')
     with pytest.raises(FormatError, match='^write T4:0, and Length 12$'):
         parse_address('T4:0-3', PlcType.SLC)
+
+
+def test_map_has_at_most_5000_rows() -> None:
+    rows = [row(Tag=f'tag{number}', Command='Read', Address=f'N7:{number % 100}')
+            for number in range(5001)]
+    mappings, problems = load_rows(*rows[:5000])
+    assert (len(mappings), problems) == (5000, [])
+    with pytest.raises(ConfigurationError, match='map.csv:5002: a map has at most 5000 rows, '):
+        load_rows(*rows)
+
+
+def test_similar_tag_is_looked_for_a_limited_number_of_times() -> None:
+    """Each search looks at all tags."""
+    guarded = [row(Tag=f'a{number}', Command='Read', Address='N7:1', While='sped',
+                   While_Timeout='9000')
+               for number in range(30)]
+    told = faults(row(Tag='speed', Command='Read'), *guarded)
+    assert [text.endswith('did you mean speed?') for text in told] == 20 * [True] + 10 * [False]

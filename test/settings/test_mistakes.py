@@ -66,7 +66,8 @@ SPREADSHEET = ('; a spreadsheet may have made a date or time of it: give the col
     ('"=""N7:0"""', FORM + '; signs that only a spreadsheet needs: write N7:0'),
     ("'N7:0", FORM + '; signs that only a spreadsheet needs: write N7:0'),
     ('N7:0 L10', 'write N7:0, and Length 10'), ('N7:10 [10]', 'write N7:10, and Length 10'),
-    ('N7:10 [' + 5000 * '9' + ']', 'write type, file, ":", element, as in N7:0, '
+    ('N7:10 [' + 5000 * '9' + ']', 'an address has at most 100 characters'),
+    ('N7:10 [' + 80 * '9' + ']', 'write type, file, ":", element, as in N7:0, '
      'B3:1/5, T4:0.ACC or I:1.0/3'),
     ('Ν7:0', FORM + '; character 1 is U+039D GREEK CAPITAL LETTER NU, not "N"'),
     ('В3:0', FORM + '; character 1 is U+0412 CYRILLIC CAPITAL LETTER VE, not "B"'),

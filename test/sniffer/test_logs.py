@@ -17,6 +17,7 @@
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 import gzip
+from itertools import count
 from pathlib import Path
 
 from abdf1_ros.problems import Problem
@@ -95,6 +96,16 @@ def test_offset_that_cannot_follow_what_was_left_out(offset: str) -> None:
         next(chunks)
         with pytest.raises(Problem, match='x:3: the offset does not fit: "[*]" stands for lines'):
             next(chunks)
+
+
+def test_all_that_is_left_out_in_a_file_is_no_more_than_in_one_place() -> None:
+    """Otherwise a few bytes of text would stand for hours of work each."""
+    row = 5000 * '1005'
+    chunks = read_hex('x', [f'00000000: {row}', '*', f'{60_000_000:08x}: {row}', '*',
+                            f'{120_000_000:08x}: {row}'])
+    assert sum(len(next(chunks).data) for _ in range(6001)) == 60_010_000
+    with pytest.raises(Problem, match='x:5: the offset does not fit.* for at most 100 MB'):
+        next(chunks)
 
 
 @for_all('line', ['10 5', 'hello', '0000000 0510 ff01', '1 2 3', '*', '00000000: 1x'])
@@ -302,8 +313,17 @@ def test_words_of_hexdump_and_od_give_back_their_bytes(data: bytes, offset: str)
     for at, row in rows(data):
         pairs = [row[n:n + 2].ljust(2, b'\0')[::-1].hex() for n in range(0, len(row), 2)]
         lines.append(f'{at:{offset}} {" ".join(pairs)}')
-    chunk, = read_words('x', [*lines, f'{len(data):{offset}}'])
-    assert chunk == Chunk(None, UNKNOWN, data)
+    chunks = list(read_words('x', [*lines, f'{len(data):{offset}}']))
+    assert b''.join(chunk.data for chunk in chunks) == data
+    assert {(chunk.time, chunk.direction) for chunk in chunks} == {(None, UNKNOWN)}
+
+
+def test_words_are_given_out_line_by_line() -> None:
+    """A dump of 100 MB is never in the memory as a whole."""
+    lines = (f'{16 * number:07x} {"0210 " * 8}' for number in count())
+    chunks = read_words('x', lines)
+    assert [next(chunks).data for _ in range(100)] == 100 * [8 * b'\x10\x02']
+    assert int(next(lines)[:7], 16) == 16 * 101  # one line ahead
 
 
 @pytest.mark.parametrize(('lines', 'text'), [
@@ -313,6 +333,16 @@ def test_words_of_hexdump_and_od_give_back_their_bytes(data: bytes, offset: str)
 def test_words_whose_offsets_do_not_fit_are_refused(lines: list[str], text: str) -> None:
     with pytest.raises(Problem, match=text):
         list(read_words('x', lines))
+
+
+@for_all('line', [
+    '12:00:01 RX ' + 900_000 * '-' + ' 10 06', '12:00:01 ' + 900_000 * '<' + ' x 10 06',
+    '12:00:01 RX ' + 200_000 * 'AA  ' + 'zz', '12:00:01 RX ' + 200_000 * '20  ' + 'zz',
+    '12:00:01 RX ' + 200_000 * 'AA\t' + 'zz', "12:00:01 RX b'" + 900_000 * '\\'])
+def test_no_line_takes_more_than_a_few_looks_at_each_sign(line: str) -> None:
+    """Where each sign asked for a look at all others, this would take longer than any test may."""
+    with suppress(Problem):
+        read(iter([line]))
 
 
 @for_all('line', [

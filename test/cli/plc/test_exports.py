@@ -116,7 +116,7 @@ def test_tag_of_kepserver_becomes_a_row(
     ('"Still","N7:0",Word,1,RO,100,Linear,0,100,7,7,Float,0,0,,"",', 'Scale should not be 0'),
     ('"Char","N7:0",Char,1,RO,100,,,,,,,,,,"",', 'Data Type "Char" has no counterpart'),
     (f'"Long","N7:0 [{"9" * 5000}]",Word Array,1,RO,100,,,,,,,,,,"",',
-     'write type, file, ":", element, as in N7:0, B3:1/5, T4:0.ACC or I:1.0/3'),
+     'an address has at most 100 characters'),
     ('"Word","N7:0",Word,1,never,100,,,,,,,,,,"",', 'Client Access "never" has no counterpart'),
     (f'"Word","N7:0",{"x" * 100},1,RO,100,,,,,,,,,,"",',
      f'Data Type "{"x" * 100}" has no counterpart'),
@@ -557,3 +557,13 @@ def test_file_that_is_not_known_is_told_with_a_cure(tmp_path: Path, text: str, t
     with pytest.raises(ConfigurationError) as caught:
         imported(tmp_path, text)
     assert told in str(caught.value)
+
+
+def test_file_with_more_rows_than_a_map_may_have_is_refused(tmp_path: Path) -> None:
+    rows = [f'tag_{number},N7:{number % 200}' for number in range(5001)]
+    path = tmp_path / 'list.csv'
+    path.write_text('\n'.join(['Tag,Address', *rows[:5000]]))
+    assert import_map(str(path), Wanted()).count == 5000
+    path.write_text('\n'.join(['Tag,Address', *rows]))
+    with pytest.raises(ConfigurationError, match='list.csv:5002: .* more than 5000 rows of a map'):
+        import_map(str(path), Wanted())

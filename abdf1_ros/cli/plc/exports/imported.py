@@ -36,6 +36,7 @@ from abdf1_ros.problems import ConfigurationError, Place, Problem
 from abdf1_ros.settings.columns import NEEDED
 from abdf1_ros.settings.csv_table import Row
 from abdf1_ros.settings.hints import looks_like_address
+from abdf1_ros.settings.map_file import MOST_ROWS
 from abdf1_ros.settings.map_row import RowReader
 from abdf1_ros.text import printable, shown
 
@@ -93,6 +94,10 @@ def import_map(path: str, wanted: Wanted) -> Import:
             _leave_out(result, path, record, found.tag, str(found))
         else:
             _add(result, seen, path, record, found, wanted)
+        if result.count > MOST_ROWS:
+            raise ConfigurationError([Problem(Place(path, record.line), (
+                f'the rows up to here make more than {MOST_ROWS} rows of a map, the most that it '
+                'can have; divide the file'))])
     return result
 
 
