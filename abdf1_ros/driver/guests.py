@@ -64,7 +64,7 @@ class GuestListener:
         """Take a command that may have changed words of a PLC, and which words."""
 
     def goes_beyond(self, guest: Guest, command: Packet) -> None:
-        """Take a command that only All allows; it will be sent."""
+        """Take a command that only All allows, of a guest that has All."""
 
     def was_refused(self, guest: Guest, command: Packet, needed: ShareAccess) -> None:
         """Take a command that was not allowed, and the right that it needs."""
@@ -179,13 +179,13 @@ class GuestQueue:
             guest.listener.was_refused(guest, command.packet, needed)
             _refuse(command, _NOT_ALLOWED)
             return
+        if needed is ShareAccess.ALL:
+            guest.listener.goes_beyond(guest, command.packet)
         if limit := self._rules.limit_broken(command.packet, guest.access):
             guest.outside += 1
             guest.listener.broke_limit(guest, command.packet, limit)
             command.answer(command.packet.reply(_BAD_VALUE, EXTENDED))
             return
-        if needed is ShareAccess.ALL:
-            guest.listener.goes_beyond(guest, command.packet)
         if not self.inbox.put(command):
             self._give_up(command, _NOT_CONNECTED)
 

@@ -60,13 +60,13 @@ def check_foreign(mapping: Mapping, raw: float, index: int) -> None:
     Check a raw value that another program writes.
 
     Raises FormatError where a limit or the type forbids it. The float32 nearest to a limit counts
-    as the limit.
+    as the limit. Min and Max of a Read row have no effect.
     """
     if not math.isfinite(raw):
         raise FormatError(f'value {raw} at index {index} is not a valid {mapping.type.value}')
     scaling, tolerance = mapping.scaling or _UNSCALED, _EXACT
     low, high = sorted((end - scaling.offset) / scaling.scale
-                       for end in (mapping.minimum, mapping.maximum))
+                       for end in _limits_in_effect(mapping))
     if mapping.type is ValueType.FLOAT32:
         nearest = array('f', (low, high))
         low, high, tolerance = min(low, nearest[0]), max(high, nearest[1]), 0.0
@@ -75,8 +75,14 @@ def check_foreign(mapping: Mapping, raw: float, index: int) -> None:
 
 
 def has_limits(mapping: Mapping) -> bool:
-    """Tell whether some values that the words of a row can hold must not be written."""
-    return mapping.type is ValueType.FLOAT32 or (mapping.minimum, mapping.maximum) != _NO_LIMITS
+    """Tell whether another program must not write some values that the words of a row can hold."""
+    if mapping.type in (ValueType.BOOL, ValueType.STRING):
+        return False
+    return mapping.type is ValueType.FLOAT32 or _limits_in_effect(mapping) != _NO_LIMITS
+
+
+def _limits_in_effect(mapping: Mapping) -> tuple[float, float]:
+    return (mapping.minimum, mapping.maximum) if mapping.writes else _NO_LIMITS
 
 
 def _raw_inside(mapping: Mapping, values: Sequence[float]) -> list[float]:

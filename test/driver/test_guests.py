@@ -225,6 +225,22 @@ def test_words_of_a_command_that_nobody_knows_may_be_any(text: str) -> None:
     assert written_extents(Packet(1, 9, data[0], 0, 1, data[1:]), 1, Rows(rows)) is None
 
 
+@for_all('entry', [
+    ('06 02 03 03', False), ('06 04 10', False), ('06 07', False), ('0F 53', False),
+    ('0F A2 50 02 22 00 00', False), ('0F 17 00 00 00 00 02', False), ('04 00 00 02', False),
+    ('0F 80 01', True), ('0F 50', True), ('0F 57', True), ('06 08 00 01', True), ('0F 99', True)])
+def test_reads_of_programs_and_settings_of_the_port_are_no_writes_of_words(
+        entry: tuple[str, bool]) -> None:
+    text, may_write = entry
+    data = bytes.fromhex(text)
+    bench = bench_of(rows=1)
+    program = Program(bench, ShareAccess.ALL)
+    program.guest.listener = told = Told()
+    program.ask(data[1:], cmd=data[0])
+    bench.run(1.0)
+    assert told.words == [(1, None)] * may_write  # the PLC refuses each of them
+
+
 def test_words_of_a_plc2_write_to_a_plc5_are_in_the_file_of_our_number_not_the_guests() -> None:
     bench = DriverBench([make_mapping('N5:0')], network=Network(baud=19200, timeout=200))
     bench.plc(1, 'PLC5', ('N5:0', 20))

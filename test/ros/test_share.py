@@ -138,6 +138,7 @@ def test_first_command_that_only_all_allows_is_told_whatever_the_right_of_the_gu
         guest = Guest('tcp:1', access, places)
         for command in (read, write, ladder, write, ladder):
             queue.put(GuestCommand(guest, command, 0.0, Mock()))
+        assert (guest.beyond, guest.refused) == (2, [4, 2, 0][[*ShareAccess].index(access)])
     refused = 'guest tcp:1: command refused: 0F/A'
     assert told_by(notes) == [
         refused + 'A to station 1, protected typed logical write N7:0 = 8721; it needs '
@@ -148,6 +149,11 @@ def test_first_command_that_only_all_allows_is_told_whatever_the_right_of_the_gu
         '40 words; it needs Share_Access All, and has Write',
         'guest tcp:1: first command that only Share_Access All allows: 0F/A2 to station 1, '
         'protected typed logical read file 2 type 22 element 0, 40 words']
+    notes.reset_mock()
+    no_number = bytes.fromhex('AA 04 08 8A 00 00 FF FF FF FF')
+    queue.put(GuestCommand(Guest('tcp:2', ShareAccess.ALL, places),
+                           Packet(255, 9, 15, 0, 7, no_number), 0.0, Mock()))
+    assert ['first command' in text for text in told_by(notes)] == [True, False]
 
 
 def test_first_value_outside_of_a_limit_is_told_with_tag_and_limit() -> None:

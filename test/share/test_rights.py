@@ -246,13 +246,15 @@ def limited_rows(plc: str) -> list[Mapping]:
     rows = [
         make_mapping('N7:10', 'Write', plc=plc, length=3, tag='speed', minimum=0.0, maximum=100.0),
         make_mapping('F8:0', 'Write', plc=plc, length=2, tag='heat', minimum=0.1, maximum=10.0),
-        make_mapping('F8:10', plc=plc, tag='level', period=5000),
+        # Min and Max have no effect in a Read row, and none on bits.
+        make_mapping('F8:10', plc=plc, tag='level', period=5000, minimum=0.0, maximum=1.0),
         make_mapping('N7:20', 'Write', plc=plc, kind='int32', tag='wide', minimum=-5.0,
                      maximum=70_000.0),
         make_mapping('N7:30', 'Write', plc=plc, tag='scaled', minimum=0.0, maximum=5.0,
                      scaling=Scaling(0.1, -10.0)),
         make_mapping('N7:50', 'Write', plc=plc, kind='float32', word_order='High', tag='high'),
-        make_mapping('B3:0/0', 'Write', plc=plc, length=4, tag='bits'),
+        make_mapping('B3:0/0', 'Write', plc=plc, length=4, tag='bits', minimum=0.0, maximum=0.0),
+        make_mapping('ST9:0', 'Write', plc=plc, tag='text'),
         make_mapping('N7:40', 'Write', plc=plc, tag='plain')]
     return rows
 
