@@ -146,7 +146,7 @@ docs: $(INSTALLED) ## Write the parts of the documentation that repeat the code
 
 .PHONY: bench
 bench: $(INSTALLED) ## Measure plan, any texts, line, processor time, latency, scale (8 minutes)
-	@for name in planning any_texts client_reads cpu_time large_maps wire_efficiency node_cpu node_latency node_scale; do \
+	@for name in planning any_texts client_reads cpu_time large_maps wire_efficiency node_cpu node_latency node_scale other_publishers; do \
 	    echo "$$name:"; timeout 300 $(PY) test/lab/benchmarks/$$name.py || exit; echo; \
 	done
 

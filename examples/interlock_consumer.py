@@ -133,7 +133,7 @@ class InterlockConsumer(Node):
         has_come, self._alive = alive > self._alive, alive
         if alive <= 0:  # -1 if another subscriber of this process came before (Fast DDS)
             self._stopped()
-        elif has_come and self._is_fresh:
+        elif has_come and (self._is_reset or self._crowd()):
             self._is_reset = False
             self._why_not = self._crowd() or 'another publisher has come'
             self._decide(False, self._why_not)

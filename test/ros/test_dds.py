@@ -28,6 +28,7 @@ from abdf1_ros.ros.diagnostics import graph as graph_module
 from abdf1_ros.ros.diagnostics.dds import BEGAN_EARLY, DdsWatch, lost_locks
 from abdf1_ros.ros.diagnostics.graph import Graph, NameWatch, TypeWatch
 from abdf1_ros.ros.diagnostics.log import News
+from abdf1_ros.ros.topic_names import TopicNames
 import pytest
 from support.mappings import make_mapping
 from support.ros import PROFILES_VARIABLE
@@ -199,8 +200,9 @@ def texts(news: Iterable[News]) -> list[str]:
 
 
 def watch_of(graph: Graph) -> TypeWatch:
-    return TypeWatch(graph, '/cell/abdf1', lambda topic: topic.replace('~', '/cell/abdf1'), [
-        make_mapping('B3:0/0', 'ReadWrite', topic='door'), make_mapping('N7:0', topic='n')])
+    rows = [make_mapping('B3:0/0', 'ReadWrite', topic='door'), make_mapping('N7:0', topic='n')]
+    names = TopicNames.of(lambda topic: topic.replace('~', '/cell/abdf1'), rows)
+    return TypeWatch(graph, '/cell/abdf1', names, rows)
 
 
 def test_other_type_is_told_once_and_again_when_it_comes_back(
@@ -220,7 +222,7 @@ def test_other_type_is_told_once_and_again_when_it_comes_back(
 
 def test_own_last_publisher_is_not_another_node(domain: Domain, graph: Graph) -> None:
     domain.topics = {'/cell/abdf1/read/n': [BITS, WORDS]}
-    graph.clashes(9.0)
+    graph.topics(9.0)
     domain.topics = {'/cell/abdf1/read/n': [WORDS]}
     assert watch_of(graph).look(10.0) == []  # the query is from before the reload
     domain.topics = {'/cell/abdf1/read/n': [BITS, WORDS]}
@@ -236,7 +238,7 @@ def test_looks_at_topics_are_as_far_apart_as_they_are_long(
     times = iter((0.0, 0.006))
     monkeypatch.setattr(graph_module, 'thread_time', lambda: next(times))
     for now in (10.0, 12.1, 21.9):
-        graph.clashes(now)
+        graph.topics(now)
     assert domain.looks == 1
 
 

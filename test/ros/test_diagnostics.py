@@ -241,7 +241,7 @@ def test_names_and_hardware_ids(bench: Bench) -> None:
             for status in bench.diagnostics.statuses(NOW)] == [
         ('line_a: link', PORT), ('line_a: counters', PORT),
         ('line_a: station 1', f'{PORT} station 1'), ('line_a: station 2', f'{PORT} station 2'),
-        ('line_a: mappings', PORT), ('line_a: writes', PORT)]
+        ('line_a: mappings', PORT), ('line_a: writes', PORT), ('line_a: topics', PORT)]
 
 
 # link
@@ -364,7 +364,7 @@ def test_link_of_a_node_with_a_duplicate_name(bench: Bench) -> None:
 
 def test_link_and_standby_tell_how_often_diagnostics_come(bench: Bench) -> None:
     bench.seen.diagnostics_period = 10.0
-    for is_waiting, count in (False, 6), (True, 1):
+    for is_waiting, count in (False, 7), (True, 1):
         assert len(bench.diagnostics.levels(NOW, is_waiting=is_waiting)) == count
         status = bench.diagnostics.statuses(NOW, is_waiting=is_waiting)[0]
         assert details(status)['diagnostics period'] == '10 s'

@@ -472,6 +472,37 @@ def test_end_of_another_type_on_a_topic_is_told(make_bench: Benches, capfd: Outp
     assert '/abdf1/read/speed is std_msgs/msg/Int16MultiArray; another node uses it as' in line
 
 
+def test_publisher_of_our_topics_or_beside_them_is_told(
+        make_bench: Benches, capfd: Output) -> None:
+    bench = make_bench(SPEED, RECIPE)
+    assert ros.until_status(bench.diagnostics, 'topics', ros.OK).message == (
+        'OK: no other node publishes topics of this bridge')
+    with ros.Observer('twin') as twin, ros.Observer('stub') as stub:
+        # of our own name, as an earlier run that was killed
+        ours = Node('abdf1', context=twin.context, use_global_arguments=False)
+        ours.create_publisher(msg.Int16MultiArray, '/abdf1/read/speed', 1)
+        ros.until_status(bench.diagnostics, 'link', ros.WARN)
+        foreign = stub.node.create_publisher(msg.UInt16MultiArray, '/abdf1/active_stations', 1)
+        for topic in '/abdf1/write/speed', '/write/recipe':
+            stub.node.create_publisher(msg.Int16MultiArray, topic, 1)
+        status = ros.until_status(
+            bench.diagnostics, 'topics', ros.ERROR, lambda status: 'recipe' in status.message)
+        assert status.message == (
+            'ERROR: /stub publishes /abdf1/active_stations too; published, but not written: '
+            '/abdf1/write/speed, /write/recipe')
+        assert ros.details(status) == {
+            '/abdf1/active_stations': 'is published by /stub too',
+            '/abdf1/write/speed': 'is published by /stub, but not written: speed is only read',
+            '/write/recipe': 'is published by /stub, but not written: this bridge takes '
+                             '/abdf1/write/recipe'}
+        stub.node.destroy_publisher(foreign)
+        ros.until_status(bench.diagnostics, 'topics', ros.WARN)
+        ours.destroy_node()
+    ros.until_status(bench.diagnostics, 'topics', ros.OK)
+    told = [line for line in capfd.readouterr().err.splitlines() if '/stub' in line]
+    assert [line.partition(' ')[0] for line in told] == ['[ERROR]', '[WARN]', '[WARN]']
+
+
 def test_two_writers_of_a_topic_can_tell_their_results_apart(make_bench: Benches) -> None:
     bench = make_bench(RECIPE)
     publisher = bench.ros.publisher(msg.Int16MultiArray, '/abdf1/write/recipe')

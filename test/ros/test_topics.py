@@ -14,10 +14,20 @@
 
 """The names of a bridge's topics, and other nodes that publish them."""
 
+from types import SimpleNamespace
+from typing import Any
+
 from abdf1_ros.problems import ConfigurationError
-from abdf1_ros.ros.topics.names import TopicNames
+from abdf1_ros.ros.diagnostics import log
+from abdf1_ros.ros.diagnostics.graph import Graph
+from abdf1_ros.ros.diagnostics.other_publishers import OtherPublisherWatch, StrayWatch
+from abdf1_ros.ros.diagnostics.status import Seen
+from abdf1_ros.ros.diagnostics.topics import TopicsStatus
+from abdf1_ros.ros.topic_names import TopicNames
+import pytest
 from support.cases import for_all
 from support.mappings import make_mapping
+from support.ros import ERROR, OK, WARN
 
 ROWS = [make_mapping('B3:0/0', topic='door'), make_mapping('B3:1/0', topic='lamps'),
         make_mapping('N7:0', 'ReadWrite', topic='speed'),
@@ -60,3 +70,200 @@ def test_two_topics_of_one_name_are_a_fault(
             f'remaps: {topics} have one name, {name}; give each topic a name of its own']
     else:
         raise AssertionError(f'{remaps} are accepted')
+
+
+class Domain:
+    """Publishers and subscribers as a node sees them, by topic; ``counts`` are the queries."""
+
+    def __init__(self, *topics: str) -> None:
+        self.publishers: dict[str, list[str]] = {topic: ['/press'] for topic in topics}
+        self.subscribers: dict[str, int] = {}
+        self.counts: list[str] = []
+
+    def count_publishers(self, topic: str) -> int:
+        self.counts.append(topic)
+        return len(self.publishers.get(topic, ()))
+
+    def count_subscribers(self, topic: str) -> int:
+        return self.subscribers.get(topic, 0)
+
+    def get_publishers_info_by_topic(self, topic: str) -> list[SimpleNamespace]:
+        parts = [node.rpartition('/') for node in self.publishers.get(topic, ())]
+        return [SimpleNamespace(node_name=name, node_namespace=namespace or '/')
+                for namespace, _, name in parts]
+
+    def get_topic_names_and_types(self) -> list[tuple[str, list[str]]]:
+        return [(topic, ['std_msgs/msg/UInt8MultiArray'])
+                for topic in {**self.publishers, **self.subscribers}]
+
+
+class Bench:
+    """Both watches and the status of a bridge /press with ``ROWS`` in a domain."""
+
+    def __init__(self, names: TopicNames) -> None:
+        self.domain = Domain(*names.published)
+        source: Any = self.domain
+        graph = Graph(source)
+        self.seen = Seen()
+        self.publishers = OtherPublisherWatch(graph, '/press', names, self.seen)
+        self.strays = StrayWatch(graph, '/press', names, self.seen)
+        self.status = TopicsStatus('/dev/ttyS0', self.seen)
+
+    def told(self, begin: float, end: float) -> list[tuple[float, str]]:
+        """Return what the watches tell, ten looks a second, and when (s) they do."""
+        times = [number / 10 for number in range(round(10 * begin), round(10 * end))]
+        return [(now, news.text) for now in times
+                for news in (*self.publishers.look(now), *self.strays.look(now))]
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return Bench(names())
+
+
+UNKNOWN = '_NODE_NAMESPACE_UNKNOWN_/_NODE_NAME_UNKNOWN_'
+DOOR, LAMPS = '/press/read/door', '/press/read/lamps'
+IS_TOO = 'too: subscribers take its messages for ours. End it, or give its topics other names'
+
+
+def test_other_publisher_is_told_once_within_a_second_and_again_when_it_comes_back(
+        bench: Bench) -> None:
+    assert bench.told(0, 5) == []
+    assert bench.status.judge(5) == (OK, 'no other node publishes topics of this bridge')
+    bench.domain.publishers[DOOR].append('/cell/stub')
+    (now, text), = bench.told(5, 20)
+    assert text == f'/cell/stub publishes {DOOR} {IS_TOO}'
+    assert 5 <= now < 6
+    assert bench.status.judge(20) == (ERROR, f'/cell/stub publishes {DOOR} too')
+    assert bench.status.values(20) == {DOOR: 'is published by /cell/stub too'}
+    bench.domain.publishers[DOOR].remove('/cell/stub')
+    assert bench.told(20, 21.5) == []
+    assert bench.status.judge(21.5)[0] == OK
+    bench.domain.publishers[DOOR].append('/cell/stub')
+    assert len(bench.told(21.5, 23)) == 1
+
+
+def test_other_publisher_is_an_error_with_all_its_topics_in_one_line(bench: Bench) -> None:
+    for topic in bench.domain.publishers:
+        bench.domain.publishers[topic] = ['/rosbag2_player', '/press', '/rosbag2_player']
+    bench.domain.publishers[DOOR].append('/stub')
+    bag, stub = bench.publishers.look(0.0)
+    assert bag.severity == stub.severity == log.ERROR
+    assert bag.text == (
+        f'/rosbag2_player publishes {DOOR}, {LAMPS}, /press/read/speed, /press/write_results, '
+        f'/press/active_stations and 1 more {IS_TOO}')
+    assert stub.text == f'/stub publishes {DOOR} {IS_TOO}'
+    assert bench.status.judge(0.0)[1] == (
+        '/rosbag2_player, /stub publish /press/active_stations, /press/read/door, '
+        '/press/read/lamps, /press/read/speed, /press/snapshot and 1 more too')
+    assert len(bench.status.values(0.0)) == 6
+
+
+def test_node_that_has_taken_the_place_of_another_is_told(bench: Bench) -> None:
+    bench.domain.publishers[DOOR].append('/stub')
+    bench.told(0, 2)
+    bench.domain.publishers[DOOR][1] = '/bag'  # within a second
+    assert [text for _, text in bench.told(2, 15)] == [f'/bag publishes {DOOR} {IS_TOO}']
+    assert bench.status.judge(15) == (ERROR, f'/bag publishes {DOOR} too')
+
+
+def test_publishers_of_our_own_name_do_not_count(bench: Bench) -> None:
+    bench.domain.publishers[DOOR] *= 2  # an earlier run that was killed, or a ~/reload
+    assert bench.told(0, 5) == []
+    bench.domain.publishers[DOOR] += ['/cell/press']
+    assert len(bench.told(5, 10)) == 1
+
+
+def test_node_without_a_name_yet_gets_one_more_look(bench: Bench) -> None:
+    bench.told(0, 1)
+    bench.domain.publishers[DOOR] += [UNKNOWN]
+    (now, text), = bench.told(1, 5)
+    assert text == f'a program without a node name publishes {DOOR} {IS_TOO}'
+    assert 1.5 < now < 3
+    bench.domain.publishers[LAMPS] += [UNKNOWN]
+    bench.told(5, 5.9)
+    bench.domain.publishers[LAMPS][-1] = '/stub'
+    assert [text for _, text in bench.told(5.9, 9)] == [f'/stub publishes {LAMPS} {IS_TOO}']
+
+
+def test_publisher_whose_name_cannot_be_read_is_told_too(bench: Bench) -> None:
+    def fail(topic: str) -> None:
+        raise UnicodeDecodeError('utf-8', b'/\xff', 1, 2, 'invalid start byte')
+
+    source: Any = bench.domain
+    source.get_publishers_info_by_topic = fail
+    bench.domain.publishers[DOOR] += ['/\xff']
+    assert [text for _, text in bench.told(0, 5)] == [
+        f'a node whose name cannot be read publishes {DOOR} {IS_TOO}']
+
+
+def test_each_topic_is_counted_once_a_second_and_not_all_at_once() -> None:
+    rows = [make_mapping(f'N7:{number}', topic=f'row{number}') for number in range(1000)]
+    bench = Bench(TopicNames.of(lambda name: f'/press{name[1:]}', rows))
+    bench.told(0, 1)
+    bench.domain.counts.clear()
+    bench.publishers.look(1.0)
+    assert len(bench.domain.counts) <= 102
+    bench.told(1.1, 11)
+    counts = [bench.domain.counts.count(f'/press/read/row{number}') for number in (0, 500, 999)]
+    assert all(count in (9, 10, 11) for count in counts), counts
+
+
+def test_spare_that_waits_tells_nothing(bench: Bench) -> None:
+    bench.seen.is_waiting = lambda: True
+    bench.domain.publishers |= {DOOR: ['/press', '/stub'], '/press/write/door': ['/stub']}
+    assert bench.told(0, 5) == []
+    bench.seen.is_waiting = lambda: False
+    assert len(bench.told(5, 8)) == 2
+    bench.seen.is_waiting = lambda: True
+    bench.told(8, 12)
+    assert bench.status.judge(12)[0] == OK
+
+
+@for_all(('topic', 'reason'), [
+    ('/press/write/door', 'door is only read'),
+    ('/press/write/speeed', 'no row writes this topic'),
+    ('/press/write/lamps/write/x', 'no row writes this topic'),
+    ('/press/write/recipe', 'this bridge takes /cell/recipe'),  # its remap is not in the program
+    ('/write/speed', 'this bridge takes /press/write/speed'),
+    ('/write/recipe', 'this bridge takes /cell/recipe')])
+def test_message_that_nobody_takes_is_told_once(topic: str, reason: str) -> None:
+    bench = Bench(names(write_recipe='/cell/recipe'))
+    bench.domain.publishers[topic] = ['/hmi']
+    told = f'is published by /hmi, but not written: {reason}'
+    assert [text for _, text in bench.told(0, 30)] == [f'{topic} {told}']
+    assert bench.status.judge(30) == (WARN, f'published, but not written: {topic}')
+    assert bench.status.values(30) == {topic: told}
+    del bench.domain.publishers[topic]
+    bench.told(30, 40)
+    assert bench.status.judge(40)[0] == OK
+
+
+def test_only_some_of_very_many_topics_beside_ours_are_looked_at(bench: Bench) -> None:
+    bench.domain.publishers |= {f'/press/write/x{number}': ['/hmi'] for number in range(1000)}
+    bench.told(0, 5)
+    assert len(bench.seen.strays) == len(bench.status.values(5)) == 40
+
+
+@for_all(('topic', 'publishers'), [
+    ('/press/write/speed', ['/hmi']), ('/press/write/door', []), ('/write/door', ['/hmi']),
+    ('/other/write/speed', ['/hmi']), ('/taken/write/speed', ['/hmi'])])
+def test_message_that_a_node_may_take_is_not_told(topic: str, publishers: list[str]) -> None:
+    bench = Bench(names())
+    bench.domain.publishers[topic] = publishers
+    bench.domain.subscribers = {'/press/write/speed': 1, '/press/write/door': 1}
+    assert bench.told(0, 30) == []
+
+
+def test_topic_without_the_name_of_the_node_may_belong_to_another_node() -> None:
+    rows = [make_mapping('N7:0', 'Write', topic='speed')]
+    source = domain = Domain()
+    graph: Any = source
+    watch = StrayWatch(Graph(graph), '/cell/press', TopicNames.of(
+        lambda name: f'/cell/press{name[1:]}', rows), Seen())
+    domain.publishers = {'/write/speed': ['/a'], '/cell/write/speed': ['/b']}
+    domain.subscribers = {'/write/speed': 1}
+    news, = watch.look(0.0)
+    assert news == (log.WARN, 'topics beside ours', (
+        '/cell/write/speed is published by /b, but not written: this bridge takes '
+        '/cell/press/write/speed'))

@@ -94,7 +94,7 @@ READS: dict[str, tuple[Any, str, list[float] | str]] = {
 WRITES = {'levels', 'temperatures', 'weight', 'label', 'flags', 'preset', 'lamp', 'total', 'name',
           'digits', 'setpoint', 'recipe', 'reset'}
 
-STATUSES = ['link', 'counters', 'station 1', 'station 2', 'mappings', 'writes']
+STATUSES = ['link', 'counters', 'station 1', 'station 2', 'mappings', 'writes', 'topics']
 
 
 @dataclass(frozen=True, slots=True)

@@ -50,8 +50,8 @@ from abdf1_ros.ros.parameters.declared import (
     read_again,
 )
 from abdf1_ros.ros.parameters.shown import ShownFiles
+from abdf1_ros.ros.topic_names import TopicNames
 from abdf1_ros.ros.topics.messages import latched_qos, results_qos
-from abdf1_ros.ros.topics.names import TopicNames
 from abdf1_ros.ros.topics.writes import WriteTopics
 from abdf1_ros.settings.heartbeats import HAND_OVER, LONGEST_END
 from abdf1_ros.settings.network import Network

@@ -40,11 +40,13 @@ from abdf1_ros.ros.callbacks import AnsweringNode
 from abdf1_ros.ros.diagnostics.alarms import Alarms
 from abdf1_ros.ros.diagnostics.events import LineEvents
 from abdf1_ros.ros.diagnostics.graph import Graph, NameWatch, TypeWatch
+from abdf1_ros.ros.diagnostics.other_publishers import OtherPublisherWatch, StrayWatch
 from abdf1_ros.ros.diagnostics.stations import LinkCounterService
 from abdf1_ros.ros.diagnostics.status import Seen
 from abdf1_ros.ros.diagnostics.statuses import Diagnostics
 from abdf1_ros.ros.diagnostics.watches import Watch, watches_of
 from abdf1_ros.ros.parameters.declared import Configuration
+from abdf1_ros.ros.topic_names import TopicNames
 from abdf1_ros.ros.topics.interlocks import InterlockWatch
 from abdf1_ros.ros.topics.messages import ACTIVE_LAYOUT
 from abdf1_ros.ros.topics.reads import ReadTopic, ReadTopics
@@ -134,10 +136,13 @@ class BridgeSession:
             node.get_fully_qualified_name().lstrip('/'), self.driver, self.port,
             self.events, configuration.map_problems, self.guests.lines, self._alarms.statuses)
         self.owners = InterlockWatch(node, self.driver)
+        our_name, names = node.get_fully_qualified_name(), TopicNames.of(
+            node.resolve_topic_name, mappings)
         self._watches: list[Watch] = [
             surroundings.names,
-            TypeWatch(surroundings.graph, node.get_fully_qualified_name(),
-                      node.resolve_topic_name, mappings),
+            TypeWatch(surroundings.graph, our_name, names, mappings),
+            OtherPublisherWatch(surroundings.graph, our_name, names, seen),
+            StrayWatch(surroundings.graph, our_name, names, seen),
             *watches_of(self.diagnostics.line, self.port, seen, self.guests.lines,
                         configuration.files.changed, self.owners.look,
                         surroundings.graph.dds.look)]

@@ -13,26 +13,29 @@
 # limitations under the License.
 
 """
-Find other nodes that have our name, or that use our topics with other types.
+The graph of the domain; find nodes that have our name, or use our topics with other types.
 
-DDS has no event for either case, so we query the graph now and then. A query takes some
+DDS has no event for such cases, so we query the graph now and then. A query takes some
 microseconds for each topic of the domain, and a process may have a hundred nodes. So all its nodes
 share one ``Graph``. The longer a query takes, the longer is the pause after it.
 """
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator
 from collections.abc import Mapping as MappingType
 from functools import partial
 from time import thread_time
+from typing import NamedTuple
 
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ros.diagnostics.dds import DdsWatch
 from abdf1_ros.ros.diagnostics.log import INFO, News, WARN
+from abdf1_ros.ros.topic_names import TopicNames
 from abdf1_ros.settings.mapping import Mapping
 from rclpy.node import Node
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 # Seconds between two looks for our name; short, to report a second node with our name before it
 # has taken many of our messages.
@@ -52,6 +55,34 @@ _MULTIPLE = 2000
 _KILLED_IS_SEEN = 30.0
 
 
+# The name that rmw gives a node that it does not know, or not yet.
+_UNKNOWN = '_NODE_NAME_UNKNOWN_'
+UNKNOWN_NODE = 'a program without a node name'
+
+
+class GraphTopics(NamedTuple):
+    """
+    The odd topics of one query.
+
+    - ``clashes``: the types of each topic with more than one
+    - ``below_write``: the topics ``<prefix>/write/<rest>``, by prefix
+    """
+
+    clashes: MappingType[str, list[str]]
+    below_write: MappingType[str, list[str]]
+
+    @classmethod
+    def of(cls, found: Iterable[tuple[str, list[str]]]) -> GraphTopics:
+        """Return the odd topics among topics with their types."""
+        clashes, below_write = {}, defaultdict[str, list[str]](list)
+        for topic, types in found:
+            if len(types) > 1:
+                clashes[topic] = types
+            if '/write/' in topic:
+                below_write[topic.partition('/write/')[0]].append(topic)
+        return cls(clashes, below_write)
+
+
 class Graph:
     """The nodes and topics of the domain, as the node ``source`` sees them; for one thread."""
 
@@ -59,7 +90,7 @@ class Graph:
         self.dds = DdsWatch()
         self._source = source
         self._nodes: Counter[tuple[str, str]] = Counter()
-        self._clashes: dict[str, list[str]] = {}
+        self._topics = GraphTopics.of(())
         self._next_names = self._next_topics = 0.0
 
     def name_watch(self, node: Node, renaming: str = '-r __node:=line_2', *,
@@ -76,14 +107,29 @@ class Graph:
             self._nodes = Counter(self._source.get_node_names_and_namespaces())
         return self._nodes[name, namespace]
 
-    def clashes(self, now: float) -> MappingType[str, list[str]]:
-        """Return the topics with more than one type: the same object until the next query."""
+    def topics(self, now: float) -> GraphTopics:
+        """Return the odd topics: the same object until the next query."""
         if now >= self._next_topics:
             begun = thread_time()
-            self._clashes = {topic: types for topic, types
-                             in self._source.get_topic_names_and_types() if len(types) > 1}
+            self._topics = GraphTopics.of(self._source.get_topic_names_and_types())
             self._next_topics = now + max(_LEAST, _MULTIPLE * (thread_time() - begun))
-        return self._clashes
+        return self._topics
+
+    def count_publishers(self, topic: str) -> int:
+        """Return the number of publishers of a topic, by its full name."""
+        return self._source.count_publishers(topic)
+
+    def count_subscribers(self, topic: str) -> int:
+        """Return the number of subscribers of a topic, by its full name."""
+        return self._source.count_subscribers(topic)
+
+    def publishers(self, topic: str) -> list[str]:
+        """Return the full names of the nodes that publish a topic, one for each publisher."""
+        try:
+            ends = self._source.get_publishers_info_by_topic(topic)
+        except UnicodeDecodeError:  # rclpy cannot read the name of one of them
+            return ['a node whose name cannot be read']
+        return [*map(_node_of, ends)]
 
     def has_other(self, topic: str, kind: str, name: str) -> bool:
         """Tell whether a node other than ``name`` has this topic with this type now."""
@@ -92,8 +138,13 @@ class Graph:
                     *self._source.get_subscriptions_info_by_topic(topic)]
         except UnicodeDecodeError:  # rclpy cannot read the name of a node, so it is not ours
             return True
-        return any(end.topic_type == kind
-                   and f'{end.node_namespace.rstrip("/")}/{end.node_name}' != name for end in ends)
+        return any(end.topic_type == kind and _node_of(end) != name for end in ends)
+
+
+def _node_of(end: TopicEndpointInfo) -> str:
+    """Return the full name of the node that has a publisher or subscriber."""
+    return UNKNOWN_NODE if end.node_name == _UNKNOWN \
+        else f'{end.node_namespace.rstrip("/")}/{end.node_name}'
 
 
 class NameWatch:
@@ -145,31 +196,31 @@ class TypeWatch:
     """
     Watches the topics of a map for nodes that use another type: DDS does not connect them.
 
-    ``resolve`` returns the full name of a topic; ``name`` is the full name of our node. Before a
-    reload a topic may have had another type, and a query may be older than that.
+    ``our_name`` is the full name of our node. Before a reload a topic may have had another type,
+    and a query may be older than that.
     """
 
-    def __init__(self, graph: Graph, name: str, resolve: Callable[[str], str],
+    def __init__(self, graph: Graph, our_name: str, names: TopicNames,
                  mappings: Iterable[Mapping]) -> None:
         self._graph = graph
-        self._name = name
+        self._our_name = our_name
         self._own = {
-            resolve(f'~/{what}/{mapping.topic}'): f'std_msgs/msg/{mapping.message_type.message}'
-            for mapping in mappings for what, is_there in (
-                ('read', mapping.reads), ('write', mapping.writes)) if is_there}
+            full[mapping.topic]: f'std_msgs/msg/{mapping.message_type.message}'
+            for mapping in mappings for full, is_there in (
+                (names.read, mapping.reads), (names.written, mapping.writes)) if is_there}
         self._seen: MappingType[str, list[str]] = {}
         self._told: set[tuple[str, str]] = set()
 
     def look(self, now: float) -> list[News]:
         """Return the wrong types that are new at the clock value ``now`` (s), each once."""
-        clashes = self._graph.clashes(now)
+        clashes = self._graph.topics(now).clashes
         if clashes is self._seen:
             return []
         self._seen = clashes
         found = {(topic, kind) for topic in clashes.keys() & self._own.keys()
                  for kind in clashes[topic] if kind != self._own[topic]
                  and ((topic, kind) in self._told
-                      or self._graph.has_other(topic, kind, self._name))}
+                      or self._graph.has_other(topic, kind, self._our_name))}
         news, self._told = found - self._told, found
         return [News(WARN, 'types of topics', (
             f'{topic} is {self._own[topic]}; another node uses it as {kind}, and DDS does not '

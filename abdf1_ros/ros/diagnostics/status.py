@@ -64,6 +64,10 @@ class Seen:
     """The reason why other programs cannot hear this process; empty if none is known."""
     crowded: Sequence[str] = ()
     """Topics with a Fallback and more than one publisher."""
+    other_publishers: dict[str, Sequence[str]] = field(default_factory=dict)
+    """The other nodes that publish a topic of ours, by topic."""
+    strays: Mapping[str, str] = field(default_factory=dict)
+    """Who publishes beside our topics, and why nothing is written, by topic."""
     conflicts: dict[str, str] = field(default_factory=dict)
     """
     Text on the value that another program has written over a heartbeat, by tag of the heartbeat.

@@ -29,6 +29,7 @@ from abdf1_ros.ros.diagnostics.mappings import MappingsStatus
 from abdf1_ros.ros.diagnostics.standby import StandbyStatus
 from abdf1_ros.ros.diagnostics.stations import StationStatus
 from abdf1_ros.ros.diagnostics.status import message_of, Status, WORDS
+from abdf1_ros.ros.diagnostics.topics import TopicsStatus
 from abdf1_ros.share.guest_line import GuestLine
 from diagnostic_msgs.msg import DiagnosticStatus
 
@@ -54,7 +55,8 @@ class Diagnostics:
         self._statuses: list[Status] = [
             LinkStatus(self.line, port, seen), self.counters,
             *(StationStatus(self.line, station, port, seen) for station in driver.stations),
-            MappingsStatus(driver, port, left_out), events.writes, *alarms]
+            MappingsStatus(driver, port, left_out), events.writes, TopicsStatus(port, seen),
+            *alarms]
         if driver.interlocks.heartbeats or driver.interlocks.fallbacks:
             self._statuses.append(InterlockStatus(self.line, port, seen))
         if guests:

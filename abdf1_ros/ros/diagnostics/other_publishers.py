@@ -1,0 +1,169 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Find other nodes that publish topics of ours, or that publish beside them.
+
+A subscriber cannot tell the messages of a second publisher from ours, and DDS has no event that
+tells one publisher of another. So we count the publishers of our topics in the ROS graph, each
+once a second.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict, deque
+from collections.abc import Iterator
+from itertools import chain, islice
+import math
+from typing import NamedTuple
+
+from abdf1_ros.ros.diagnostics.graph import Graph, GraphTopics, UNKNOWN_NODE
+from abdf1_ros.ros.diagnostics.log import ERROR, News, WARN
+from abdf1_ros.ros.diagnostics.status import Seen
+from abdf1_ros.ros.topic_names import TopicNames
+from abdf1_ros.text import first
+
+# Longest time (s) between two counts of a topic. A count takes some 10 us. So topics are counted
+# in turns: a thousand at once would hold up the link.
+_PERIOD = 1.0
+
+# Most topics beside ours that are looked at after a query: any program can make thousands.
+_MOST_BESIDE = 40
+
+# Seconds after which the nodes of a topic are asked for again although their number is the same: a
+# question takes some 100 us.
+_NAMES_LAST = 10.0
+
+
+class _Publishers(NamedTuple):
+    """The number of publishers of a topic, their nodes, and until when (s) these are known."""
+
+    size: int
+    nodes: frozenset[str]
+    until: float
+
+
+_NO_PUBLISHERS = _Publishers(0, frozenset(), 0.0)
+
+
+class OtherPublisherWatch:
+    """
+    Reports other nodes that publish topics of ours.
+
+    Nodes of our own full name do not count: an earlier run that was killed, a spare, or what
+    ``NameWatch`` reports. A node that has come this moment may have no name yet, so it gets one
+    more look.
+    """
+
+    def __init__(self, graph: Graph, our_name: str, names: TopicNames, seen: Seen) -> None:
+        self._graph = graph
+        self._our_name = our_name
+        self._seen = seen
+        self._turns = deque(names.published)
+        self._last_look = -math.inf
+        self._crowded: dict[str, _Publishers] = {}
+
+    def look(self, now: float) -> list[News]:
+        """Return the nodes that are new at the clock value ``now`` (s), each once for a topic."""
+        found, new = self._seen.other_publishers, defaultdict[str, list[str]](list)
+        for topic in self._due(now):
+            before = found.pop(topic, ())
+            if nodes := self._others(topic, now):
+                found[topic] = nodes
+            for node in nodes:
+                if node not in before:
+                    new[node].append(topic)
+        return [News(ERROR, 'other publishers', (
+            f'{node} publishes {first(topics)} too: subscribers take its messages for ours. End '
+            'it, or give its topics other names')) for node, topics in new.items()]
+
+    def _due(self, now: float) -> Iterator[str]:
+        """Yield the topics whose turn it is; a waiting spare publishes none."""
+        part = min(1.0, (now - self._last_look) / _PERIOD)
+        self._last_look = now
+        if self._seen.is_waiting():
+            self._seen.other_publishers.clear()
+            return
+        for _ in range(math.ceil(part * len(self._turns))):
+            self._turns.rotate(-1)
+            yield self._turns[-1]
+
+    def _others(self, topic: str, now: float) -> tuple[str, ...]:
+        """Return the other nodes that publish a topic."""
+        before = self._crowded.pop(topic, _NO_PUBLISHERS)
+        if (size := self._graph.count_publishers(topic)) < 2:
+            return ()
+        is_new = UNKNOWN_NODE not in before.nodes
+        if size == before.size and now < before.until and is_new:
+            nodes, until = before.nodes, before.until
+        else:
+            nodes, until = frozenset(self._graph.publishers(topic)), now + _NAMES_LAST
+        self._crowded[topic] = _Publishers(size, nodes, until)
+        return tuple(sorted(nodes - {self._our_name, *([UNKNOWN_NODE] if is_new else ())}))
+
+
+class StrayWatch:
+    """
+    Reports publishers of topics that look like our write topics, and that no node takes.
+
+    These are topics below ``~/write/`` without a Write row, and our write topics without the name
+    of the node or without the namespace.
+    """
+
+    def __init__(self, graph: Graph, our_name: str, names: TopicNames, seen: Seen) -> None:
+        self._graph = graph
+        self._our_name = our_name
+        self._names = names
+        self._seen = seen
+        self._topics: GraphTopics | None = None
+
+    def look(self, now: float) -> list[News]:
+        """Return the topics that are new at the clock value ``now`` (s), each once."""
+        topics = self._graph.topics(now)
+        if topics is self._topics:
+            return []
+        self._topics, before = topics, self._seen.strays
+        self._seen.strays = {} if self._seen.is_waiting() else dict(self._strays(topics))
+        return [News(WARN, 'topics beside ours', f'{topic} {text}')
+                for topic, text in self._seen.strays.items() if topic not in before]
+
+    def _strays(self, topics: GraphTopics) -> Iterator[tuple[str, str]]:
+        beside = chain(self._below(topics), self._beside(topics))
+        for topic, reason in islice(beside, _MOST_BESIDE):
+            if nodes := sorted({*self._graph.publishers(topic)}):
+                yield topic, f'is published by {first(nodes)}, but not written: {reason}'
+
+    def _below(self, topics: GraphTopics) -> Iterator[tuple[str, str]]:
+        """Yield topics below ``~/write/`` that are not ours, and why they are not."""
+        names, taken = self._names, {*self._names.written.values()}
+        for topic in topics.below_write.get(self._our_name, ()):
+            below = topic.removeprefix(f'{self._our_name}/write/')
+            if topic in taken:
+                continue
+            if below in names.written:
+                yield topic, self._takes(below)
+            else:
+                yield topic, f'{below} is only read' if below in names.read else \
+                    'no row writes this topic'
+
+    def _beside(self, topics: GraphTopics) -> Iterator[tuple[str, str]]:
+        """Yield our write topics without the node's name, where no node takes them."""
+        for prefix in {'', self._our_name.rpartition('/')[0]}:
+            for topic in topics.below_write.get(prefix, ()):
+                below = topic.removeprefix(f'{prefix}/write/')
+                if below in self._names.written and not self._graph.count_subscribers(topic):
+                    yield topic, self._takes(below)
+
+    def _takes(self, below: str) -> str:
+        return f'this bridge takes {self._names.written[below]}'
