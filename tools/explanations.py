@@ -82,7 +82,8 @@ MESSAGES: dict[Message, Cause] = {
         'Harmless once in a while, when Src and Dst are right. Often: Timeout or Cmd_Timeout is '
         'too short for this PLC, or a gateway holds replies back. If Dst is not our Station: a '
         'second master, or two devices with one station number. In Mode Peer also a gateway that '
-        'puts its own number into Dst: give Station that number.'),
+        'puts its own number into Dst: give Station that number. Or a second device has the same '
+        'port by a passive splitter: take it off, it may use Share.'),
     Message.ERR_RCVD_NAK_SYMBOL: Cause(
         'A station answered a message or a poll with DLE NAK; Allen-Bradley slaves never do. In '
         'Mode Peer: our message arrived damaged, or the PLC has no room.',

@@ -196,8 +196,8 @@ def check_conversation(entry):
         if 'asks' in line:
             asked.append(bytes.fromhex(line['asks']))
         reply = bytes.fromhex(line.get('gets', ''))
-        if reply and not any(
-                reply[:3] == bytes((command[1], command[0], command[2] | 0x40))
+        if reply and not any(  # DST may be the number of a gateway (M 6-4)
+                reply[1:3] == bytes((command[0], command[2] | 0x40))
                 and reply[4:6] == command[4:6] for command in asked):
             yield f'at {last} is no reply to a command'
 

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 from typing import NamedTuple
 
 from abdf1_ros.df1.packet import BROADCAST, Packet, REPLY_BIT
@@ -28,6 +29,7 @@ from abdf1_ros.sniffer.entries import Mark
 # standard polling may need another 5 s until it polls the station.
 _PATIENCE = 10.0
 _MOST_OPEN = 1000
+_MOST_UNDER_WAY = 16  # newest commands, to which a reply to another number may belong
 
 # By radio modem, a message that comes again within this time (s) is treated as forwarded by a
 # node. The sender of a message waits longer before it repeats the message: for the time-out of the
@@ -113,6 +115,8 @@ class Conversation:
         self._last: dict[Direction, _Said] = {}
         self._given_up: list[Transaction] = []
         self._guest = ('', '')  # TNS and place
+        self._askers: set[int] = set()  # nodes that have sent a command
+        self._other: int | None = None  # DST of the last reply that came to another number
         self.copies = Copies()
 
     def take(self, packet: Packet, time: float | None, direction: Direction,
@@ -127,7 +131,8 @@ class Conversation:
             self._begin(packet, time, mark)
             known = self._open.get((packet.src, packet.dst, packet.tns))
             return MessageFacts(marks=marks, guest=known.guest if known else '')
-        transaction = self._open.get((packet.dst, packet.src, packet.tns))
+        transaction = self._open.get((packet.dst, packet.src, packet.tns)) \
+            or self._of_gateway(packet)
         if transaction is None:
             return MessageFacts(marks=(*marks, Mark.STRAY))
         command = transaction.command
@@ -138,6 +143,24 @@ class Conversation:
             latency = time - begun
         transaction.answered = True
         return MessageFacts(command, latency, marks, transaction.guest)
+
+    def _of_gateway(self, reply: Packet) -> Transaction | None:
+        """
+        Return the command of a reply to another number; None if it answers none.
+
+        A gateway may put its own number in place of the sender's into a command (M 6-4). As on our
+        own line, that is believed if two replies in a row have the number. A node that has sent a
+        command itself is not this gateway.
+        """
+        if reply.dst in self._askers:
+            return None
+        for transaction in islice(reversed(self._open.values()), _MOST_UNDER_WAY):
+            command = transaction.command
+            if not transaction.answered and reply._replace(dst=command.src).answers(command) \
+                    and reply.cmd == command.cmd | REPLY_BIT:
+                is_known, self._other = reply.dst == self._other, reply.dst
+                return transaction if is_known else None
+        return None
 
     def note_guest(self, note: str) -> None:
         """Record "TNS place": the next command with this TNS is from the guest at this place."""
@@ -181,6 +204,7 @@ class Conversation:
         return None
 
     def _begin(self, command: Packet, time: float | None, mark: Mark | None) -> None:
+        self._askers.add(command.src)
         key = command.src, command.dst, command.tns
         known = self._open.get(key)
         if command.dst == BROADCAST or mark is Mark.FORWARDED:

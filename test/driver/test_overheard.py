@@ -479,3 +479,16 @@ def test_rows_have_what_recorded_programs_have_read(capture: Capture) -> None:
         read = [[*mapping.codec.decode(part)] for part in parts if part]
         assert heard == read or is_radio and all(values in read for values in heard), place
     assert bench.listener.reads or not rows
+
+
+@pytest.mark.parametrize(('asks', 'values'), [(False, [[1, 2, 3, 4]]), (True, [])])
+def test_reply_to_the_number_of_a_gateway_counts_from_the_second_on(
+        asks: bool, values: list[list[int]]) -> None:
+    """M 6-4. A node that asks is not the gateway: these replies are for its own commands."""
+    bench, mapping = listening()
+    if asks:
+        bench.hear(frame(command(3, 'A2 02 07 89 09 00', src=8)))
+    for tns in (7, 8):
+        bench.hear(frame(command(tns, READ_N7_0)))
+        bench.hear(frame(reply(tns, VALUES, src=8)))
+    assert bench.values(mapping) == values
