@@ -87,8 +87,6 @@ class Counters:
     enqs_received: int = 0
     refused_for_memory: int = 0
     unsent_messages: int = 0  # by radio, when the port was lost
-    # Nor for this one: characters 11 and 13 hex, which software flow control swallows.
-    flow_controls_received: int = 0
 
     @property
     def damaged_frames(self) -> int:

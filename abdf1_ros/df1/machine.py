@@ -228,6 +228,7 @@ class Machine:
     even while the line is busy. After a pause of this process that is longer than
     ``senders_patience`` (s), a message ``may_be_old``; infinite where ``serve`` judges its age.
 
+    ``flow_controls`` is how many bytes 11 and 13 hex came, which software flow control swallows.
     ``is_behind`` is set while bytes have come that ``receive_data`` is still to be given.
     ``sender`` has the bytes to send. ``late`` is the sum of the seconds by which calls came more
     than MOST_LATE after a deadline of the procedure. In this time the process, or its host, did
@@ -247,6 +248,7 @@ class Machine:
         self.now = 0.0
         self.deadline: float | None = None
         self.late = 0.0
+        self.flow_controls = 0
         self.is_behind = False
         # of the last pauses, the end and the seconds
         self._pauses = deque[tuple[float, float]](maxlen=_MOST_PAUSES)
@@ -362,7 +364,7 @@ class Machine:
         """Take bytes from the line."""
         self.now = now
         self.counters.chars_received += len(data)
-        self.counters.flow_controls_received += data.count(_XON) + data.count(_XOFF)
+        self.flow_controls += data.count(_XON) + data.count(_XOFF)
         if self._forget_on_send and (self.sender.waiting or not self._is_listening):
             self._count(data)
             return  # these bytes came before our command left, so they cannot answer it

@@ -206,8 +206,8 @@ def test_line_of_a_device_server_is_ours_when_any_station_has_answered_since_it_
     around.active_stations.publish.side_effect = lambda table: setattr(
         stations.words, 'return_value', [7])
     vars(session).update(_surroundings=around, _port_text='', events=events, driver=Mock(
-                         stations=stations), reads=Mock(latest=latest), configuration=Mock(
-                             port=port, **{'parameters.standby': has_line}))
+                         stations=stations), reads=Mock(latest=latest), diagnostics=Mock(),
+                         configuration=Mock(port=port, **{'parameters.standby': has_line}))
     for is_open, is_released in (True, False), (False, False), (True, False), (False, True):
         around.link.is_released = is_released
         around.link.state = PortState(is_open, str(is_open))

@@ -18,10 +18,9 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable
-from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
-from abdf1_ros.counters import Counters
 from abdf1_ros.df1.echo import COMES_BACK
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.odd import DAMAGED
@@ -49,6 +48,21 @@ SWALLOWED = ('messages have a wrong check, and no byte 11 or 13 hex has come: do
 _HEARD_LATELY = 10.0
 
 
+class _Came(NamedTuple):
+    """Commands that have gone out; good and damaged messages, bytes 11 and 13 that have come."""
+
+    commands: int
+    messages: int
+    damaged: int
+    flow_controls: int
+
+
+def _came(driver: Driver) -> _Came:
+    counters = driver.counters
+    return _Came(counters.commands_sent, counters.messages_received, counters.damaged_frames,
+                 driver.machine.flow_controls)
+
+
 class LineView:
     """
     The faults on the line of a driver, for statuses and watches.
@@ -61,11 +75,11 @@ class LineView:
         self.link: LinkThread | None = None
         self.opener: PortOpener | None = None
         self._rows_by_kind = _rows_by_kind(driver.mappings)
-        self._before = Counters()  # what had been counted when the port was opened
+        self._before = _came(driver)
 
     def port_opened(self) -> None:
         """Begin anew: another connection may pass other bytes."""
-        self._before = replace(self.driver.counters)
+        self._before = _came(self.driver)
 
     def attach(self, link: LinkThread, opener: PortOpener) -> None:
         """Set the thread whose port is reported, and the opener of this port."""
@@ -128,13 +142,10 @@ class LineView:
 
     def _swallowed(self) -> str:
         """Return a text if all that has come looks as if bytes 11 and 13 were taken out of it."""
-        counters, before = self.driver.counters, self._before
-        if counters.flow_controls_received > before.flow_controls_received:
-            return ''
-        damaged = counters.damaged_frames - before.damaged_frames
-        messages = damaged + counters.messages_received - before.messages_received
-        is_shown = damaged >= _ENOUGH_DAMAGED and min(
-            messages, counters.commands_sent - before.commands_sent) >= _ENOUGH
+        came = _Came(*(now - before for now, before in zip(
+            _came(self.driver), self._before, strict=True)))
+        is_shown = not came.flow_controls and came.damaged >= _ENOUGH_DAMAGED and min(
+            came.commands, came.damaged + came.messages) >= _ENOUGH
         return SWALLOWED if is_shown else ''
 
     def evidence_of(self, station: Station) -> str:
