@@ -379,6 +379,15 @@ class Machine:
         if self.decoder.in_message:
             self._hear_out(now)
 
+    def drop(self, count: int, now: float) -> None:
+        """Record bytes from the line that came too fast to be of use; the next may be old."""
+        self.now = now
+        self.counters.chars_received += count
+        self.decoder.noise += count
+        self.decoder.reset()
+        if self._senders_patience < math.inf:
+            self.treat_as_old()
+
     def _count(self, data: bytes) -> None:
         """Count the symbols that come while a master does not listen."""
         if self.sender.waiting:

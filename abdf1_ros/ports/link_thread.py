@@ -40,6 +40,7 @@ _FAULT_WINDOW = 60.0
 
 _POLL_STEP = 0.001  # poll(2) counts milliseconds
 
+_DROPPED = 65536  # bytes of a flood that are dropped between two rests
 _PORTION = 64  # most bytes of one step of work, if bytes come too fast
 
 
@@ -373,6 +374,9 @@ class LinkThread(threading.Thread):
             if not left:  # a terminal keeps few bytes, and a pseudo-terminal has no speed
                 machine.came(0 if port.is_terminal else len(data), now)
             machine.is_behind = port.has_more or len(data) > _PORTION and bool(left)
+            if port.has_more and not left and self._pace.is_flood:
+                left = self._drop(port, len(data), now)
+                continue
             if left or port.has_more:
                 left = self._take_portion(data, now)
                 continue
@@ -395,12 +399,28 @@ class LinkThread(threading.Thread):
         if portion:
             machine.receive_data(portion, now)
         # There is no portion if all bytes read were commands of a device server.
-        count = len(portion) or READ_SIZE
+        self._rest_after(len(portion) or READ_SIZE, now)
+        return data[_PORTION:]
+
+    def _drop(self, port: Port, count: int, now: float) -> bytes:
+        """Drop ``count`` bytes of a flood and more, then rest; return the bytes at its end."""
+        data = b''
+        while port.has_more and count < _DROPPED:
+            count += len(data)
+            data = port.read(0.0, self._wake.descriptor)
+        if port.has_more:
+            count, data = count + len(data), b''
+        self._machine.drop(count, now)
+        self._rest_after(count, now)
+        return data
+
+    def _rest_after(self, count: int, now: float) -> None:
+        """Rest after ``count`` bytes, then take a wake."""
+        machine = self._machine
         self._rest(self._pace.rest_after(count, machine.timing.char_time, now))
         self._pace.go_on()
         if self._wake.take() and not self._stopping:
             machine.wake(self._clock())
-        return data[_PORTION:]
 
     def _rest(self, seconds: float) -> None:
         """Let other threads have the processor, for some time, or until a deadline or a wake."""

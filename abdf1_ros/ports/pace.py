@@ -27,6 +27,15 @@ _OTHERS = 19
 _FASTEST = 10 / 115200  # s per character, if the line has no speed
 
 
+# A burst becomes a flood after this number of bytes: several of the longest messages. What a
+# device server has kept longer is too old to be of use.
+_FLOOD = 4096
+# The bytes of a flood are only dropped. So up to this number of bytes the rests may be shorter:
+# a megabyte of old bytes is over soon, and a flood that goes on for ever leaves time to others.
+_OLD_BYTES = 4_000_000
+_OTHERS_WHILE_DROPPED = 4
+
+
 class Pace:
     """
     The rests between the portions of a burst.
@@ -35,22 +44,30 @@ class Pace:
     Without rests, the burst would use a whole processor, and keep the interpreter lock from the
     other lines of this process. A burst that ends is processed in the time that it would have
     taken on the line. This time ends at ``line_until`` (clock value, s; minus infinity for no
-    burst).
+    burst). ``taken`` is the number of its bytes.
     """
 
     def __init__(self, clock: Callable[[], float], processor_clock: Callable[[], float]) -> None:
         self.line_until = -math.inf
+        self.taken = 0
         self._clock = clock
         self._processor_clock = processor_clock
         self._worked = 0.0  # processor time (s) up to the last portion
 
+    @property
+    def is_flood(self) -> bool:
+        """Tell whether the next bytes of the burst are to be dropped."""
+        return self.line_until > -math.inf and self.taken >= _FLOOD
+
     def rest_after(self, count: int, char_time: float, now: float) -> float:
         """Return how long (s) to rest after ``count`` characters that had come at ``now``."""
         if self.line_until == -math.inf:
-            self.line_until = now
+            self.line_until, self.taken = now, 0
+        others = _OTHERS_WHILE_DROPPED if _FLOOD <= self.taken < _OLD_BYTES else _OTHERS
+        self.taken += count
         self.line_until += count * (char_time or _FASTEST)
         used = self._processor_clock() - self._worked
-        return max(0.0, min(_OTHERS * used, self.line_until - self._clock()))
+        return max(0.0, min(others * used, self.line_until - self._clock()))
 
     def go_on(self) -> None:
         """Begin to measure the processor time of the next portion."""

@@ -276,9 +276,48 @@ def test_connection_that_babbles_leaves_time_to_others(
 def test_burst_beside_load_takes_the_time_of_the_line() -> None:
     """Some portions wait long for the processor; the others make up for it."""
     script = Script(Listen(None), timing=LineTiming(0.001))
-    port = Babbler(bytes(READ_SIZE), 11)
+    port = Babbler(bytes(READ_SIZE), 9)
     Restful(script, port, work=0.01, late=[0.3] * 10).run_out()
-    assert port.now - 100.0 == pytest.approx(10 * READ_SIZE * 0.001)
+    assert port.now - 100.0 == pytest.approx(8 * READ_SIZE * 0.001)
+
+
+@pytest.mark.parametrize(('reads', 'others'), [(2001, 4), (8009, 19)])
+def test_flood_is_dropped_after_its_first_bytes(reads: int, others: int) -> None:
+    """It leaves time to others: most of it, when it is longer than what a server may keep."""
+    script = Script(Listen(None))
+    port = Babbler(bytes(READ_SIZE), reads + 1, quiet=1)
+    thread = Restful(script, port)
+    drop, dropped, were_old = script.machine.drop, list[int](), list[bool]()
+
+    def take(count: int, now: float) -> None:
+        dropped.append(count)
+        drop(count, now)
+        were_old.append(script.machine.may_be_old)
+        port.worked += 0.0001
+
+    script.machine.drop = take  # type: ignore[method-assign]
+    thread.run_out()
+    assert thread.taken == [64] * (64 + 8)
+    assert set(dropped[:-1]) == {65536 + READ_SIZE}
+    assert sum(dropped) == READ_SIZE * (reads - 9)
+    assert thread.rests[-1] == pytest.approx(others * 0.0001)
+    assert script.machine.counters.chars_received == reads * READ_SIZE
+    assert all(were_old)
+
+
+def test_command_around_a_flood_is_no_command() -> None:
+    """What comes before dropped bytes and what comes after them are never one message."""
+    frame = message_frame(Packet(1, 5, 0x0F, 0, 7).encode(), Checksum.CRC)
+    for count in (0, 512):
+        script = Script(Listen(None))
+        script.machine.start(0.0)
+        script.machine.receive_data(frame[:6], 0.0)
+        if count:
+            script.machine.drop(count, 0.0)
+        script.machine.receive_data(frame[6:], 0.0)
+        heard = [] if script.heard.empty() else [script.heard.get_nowait()]
+        assert any(isinstance(symbol, Frame) and symbol.fault is None
+                   for symbol in heard) is (count == 0)
 
 
 @pytest.mark.parametrize(('char_time', 'pace'), [(0.001, 0.001), (0.0, 10 / 115200)])
