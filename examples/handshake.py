@@ -35,7 +35,9 @@ row has two words, busy and done. The request is published at a steady rate whil
 its row may have a Fallback of 0: then the PLC also learns when this program dies. With
 ``--control TAG`` a Read row of one bit shows whether the PLC uses the values from ROS (rung 7 of
 the tutorial on heartbeats). While this bit is 0, the program neither requests a job nor waits for
-one.
+one. With two living publishers of one of these topics it is unknown which of them is the bridge:
+the program requests no job, and the end of a requested job is unknown. The bridge has to publish
+these topics at least every ``--patience`` seconds.
 
 Exit status: 0 done, 1 not done and not begun, 3 unknown.
 """
@@ -48,11 +50,14 @@ from enum import Enum
 import signal
 import sys
 import time
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
 import rclpy
+from rclpy.duration import Duration
+from rclpy.event_handler import SubscriptionEventCallbacks, UnsupportedEventTypeError
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 from std_msgs.msg import Int16MultiArray, UInt8MultiArray
@@ -88,32 +93,63 @@ def step_of(number: int, busy: int, done: int) -> Step:
 
 
 class Handshake(Node):
-    """Requests jobs over the bridge ``bridge``."""
+    """
+    Requests jobs over the bridge ``bridge``.
 
-    def __init__(self, bridge: str, control: str = '') -> None:
+    ``patience`` is the time (s) within which the bridge has to publish each topic again. A
+    publisher that has not done so is not alive.
+    """
+
+    def __init__(self, bridge: str, control: str = '', patience: float = 2.0) -> None:
         super().__init__('handshake')
         # A late subscriber gets the last value, unless it is older than the bridge's stale time.
-        qos = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self._qos = QoSProfile(
+            depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL,
+            liveliness=LivelinessPolicy.MANUAL_BY_TOPIC,
+            liveliness_lease_duration=Duration(seconds=patience))
+        self._patience = patience
+        self._crowd = ''  # which topic has had two living publishers
         self._state: tuple[int, int] | None = None
         self._states = 0  # number of received states
         self._result = 'no result has come'
         self._is_at_rest = False  # a 0 has been confirmed
         self.create_subscription(
             DiagnosticStatus, f'{bridge}/write_results', self._take_result, 100)
-        self.create_subscription(Int16MultiArray, f'{bridge}/read/job_state', self._take, qos)
+        self._listen(Int16MultiArray, f'{bridge}/read/job_state', self._take)
         self._is_in_control = not control
         if control:
-            self.create_subscription(
-                UInt8MultiArray, f'{bridge}/read/{control}', self._take_control, qos)
+            self._listen(UInt8MultiArray, f'{bridge}/read/{control}', self._take_control)
         self._requests = self.create_publisher(Int16MultiArray, f'{bridge}/write/job_request', 1)
+
+    def _listen(self, kind: type, topic: str, callback: Callable[..., None]) -> None:
+        """Subscribe to a read topic, and count its living publishers."""
+        def count(alive: int) -> None:
+            if alive > 1:
+                self._crowd = f'{topic} has {alive} publishers'
+
+        def take(message: Any) -> None:
+            count(subscription.get_publisher_count())
+            callback(message)
+
+        try:
+            self.create_subscription(
+                kind, topic, callback, self._qos, event_callbacks=SubscriptionEventCallbacks(
+                    liveliness=lambda event: count(event.alive_count)))
+        except UnsupportedEventTypeError:  # rmw_zenoh lacks this event
+            subscription = self.create_subscription(kind, topic, take, self._qos)
 
     def run(self, begin_within: float, done_within: float) -> int:
         """Let one job be done (times in s); return the exit status."""
         if not self._spin(lambda: self._state is not None
                           and self._requests.get_subscription_count() > 0, begin_within):
-            print('not begun: no job_state from the PLC, or no bridge takes job_request')
+            print('not begun: no job_state from the PLC within --patience, or no bridge takes '
+                  'job_request')
             return NOT_BEGUN
         assert self._state is not None
+        # Within this time each living publisher publishes again.
+        if self._spin(lambda: bool(self._crowd), self._patience):
+            print(f'not begun: {self._crowd}')
+            return NOT_BEGUN
         if not self._spin(lambda: self._is_in_control, begin_within):
             print('not begun: ROS is not in control of the PLC; a person has to press reset there')
             return NOT_BEGUN
@@ -123,16 +159,19 @@ class Handshake(Node):
         number = next_number(*self._state)
         print(f'job {number} requested', flush=True)
         step = self._request(number, begin_within, lambda step: step is not Step.WAITING)
-        if step is Step.WAITING:
+        if step is Step.WAITING and not self._crowd:
             print(f'job {number}: {step.value}; request: {self._result}', flush=True)
             if not self._take_back(begin_within):
                 print(f'job {number}: unknown whether it begins: the request is not taken back')
                 return UNKNOWN
             step = step_of(number, *self._state)
-        if step is Step.BUSY:
+        if step is Step.BUSY and not self._crowd:
             print(f'job {number} has begun', flush=True)
             step = self._request(number, done_within, lambda step: step is Step.DONE)
         self._requests.publish(Int16MultiArray(data=[0]))
+        if self._crowd:
+            print(f'job {number}: unknown: {self._crowd}')
+            return UNKNOWN
         print(f'job {number}: {step.value}')
         return {Step.DONE: DONE, Step.WAITING: NOT_BEGUN, Step.BUSY: UNKNOWN}[step]
 
@@ -142,8 +181,10 @@ class Handshake(Node):
             assert self._state is not None
             return step_of(number, *self._state)
 
-        self._publish_until(
-            number, lambda: is_enough(step()) or not self._is_in_control, seconds)
+        def is_over() -> bool:
+            return bool(self._crowd) or not self._is_in_control or is_enough(step())
+
+        self._publish_until(number, is_over, seconds)
         if not self._is_in_control:
             print('ROS has lost control of the PLC', flush=True)
         return step()
@@ -200,13 +241,16 @@ def main() -> int:
                         help='the PLC has to begin within this time (s) (default: %(default)g)')
     parser.add_argument('--done-within', type=float, default=60.0, metavar='S',
                         help='the job has to be done within this time (s) (default: %(default)g)')
+    parser.add_argument('--patience', type=float, default=2.0, metavar='S',
+                        help='the bridge has to publish each topic within this time (s) again; '
+                        'at least the stale time that check prints (default: %(default)g)')
     parser.add_argument('--control', default='', metavar='TAG',
                         help='tag of a Read row of one bit: 1 if ROS is in control of the PLC')
     options = parser.parse_args(remove_ros_args(sys.argv)[1:])
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.default_int_handler)
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    node = Handshake(options.node, options.control)
+    node = Handshake(options.node, options.control, options.patience)
     try:
         return node.run(options.begin_within, options.done_within)
     except KeyboardInterrupt:

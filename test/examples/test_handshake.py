@@ -20,7 +20,8 @@ import runpy
 import threading
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
-from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.duration import Duration
+from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile
 from std_msgs.msg import Int16MultiArray, UInt8MultiArray
 from support.cases import for_all
 from support.ros import Observer, Process
@@ -33,22 +34,35 @@ Plc = Callable[[int, list[int]], None]
 
 
 def run(plc: Plc, state: list[int], *args: str, result: str = 'written',
-        control: list[int] | None = None) -> tuple[int, list[str], list[int]]:
+        control: list[int] | None = None, stub: list[int] | None = None,
+        ) -> tuple[int, list[str], list[int]]:
     """
     Return exit status and lines of the example, and the requests that came.
 
     ``result`` is that of each; what is not written does not come to the PLC. ``control`` is the
-    bit that says whether the PLC uses what is written.
+    bit that says whether the PLC uses what is written. ``stub`` is the state that a second node
+    publishes: from the begin on, or from the first request on if it says that job 5 is done.
     """
-    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    lease = Duration(seconds=1)
+    latched = QoSProfile(
+        depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL, liveliness_lease_duration=lease,
+        liveliness=LivelinessPolicy.MANUAL_BY_TOPIC)
     requests: list[int] = []
     with Observer() as observer:
         states = observer.node.create_publisher(Int16MultiArray, '/fake/read/job_state', latched)
         results = observer.node.create_publisher(DiagnosticStatus, '/fake/write_results', 10)
         controls = observer.node.create_publisher(UInt8MultiArray, '/fake/read/control', latched)
         controls.publish(UInt8MultiArray(data=control or [1]))
-        states.publish(Int16MultiArray(data=state))
-        observer.node.create_timer(0.1, lambda: states.publish(Int16MultiArray(data=state)))
+
+        def publish() -> None:
+            states.publish(Int16MultiArray(data=state))
+            if stub is not None and (stub != [5, 5] or requests):
+                stubs.publish(Int16MultiArray(data=stub))
+
+        if stub is not None:
+            stubs = observer.node.create_publisher(Int16MultiArray, states.topic_name, latched)
+        publish()
+        observer.node.create_timer(0.1, publish)
 
         def take(message: Int16MultiArray) -> None:
             requests.append(message.data[0])
@@ -70,7 +84,7 @@ def run(plc: Plc, state: list[int], *args: str, result: str = 'written',
             states.publish(Int16MultiArray(data=before))  # the bridge had read it already
 
         observer.node.create_subscription(Int16MultiArray, '/fake/write/job_request', take, 10)
-        with Process(EXAMPLE, '--node', '/fake', *args) as example:
+        with Process(EXAMPLE, '--node', '/fake', '--patience', '1', *args) as example:
             observer.until(lambda: not example.is_running, 'the example to end')
             return example.result(), example.lines, requests
 
@@ -133,6 +147,21 @@ def test_job_whose_control_is_lost_is_taken_back() -> None:
     assert (status, requests[0], requests[-1]) == (1, 5, 0)
     assert lines[:2] == ['job 5 requested', 'ROS has lost control of the PLC']
     assert requests.count(5) < 20  # of fifty in the time that it has to begin
+
+
+def test_nothing_is_asked_for_while_two_nodes_publish_the_state() -> None:
+    status, lines, requests = run(lambda request, state: None, [4, 4], stub=[3, 3])
+    assert (status, lines, requests) == (
+        1, ['not begun: /fake/read/job_state has 2 publishers'], [])
+
+
+def test_job_is_unknown_if_a_second_node_says_that_it_is_done() -> None:
+    status, lines, requests = run(
+        lambda request, state: None, [4, 4], '--begin-within', '10', stub=[5, 5])
+    assert (status, lines[0], lines[-1]) == (
+        3, 'job 5 requested', 'job 5: unknown: /fake/read/job_state has 2 publishers')
+    assert requests[-1] == 0
+    assert 'job 5: done' not in lines
 
 
 def test_job_that_is_not_done_in_time_is_unknown() -> None:
