@@ -270,7 +270,9 @@ OF_SLC = (
     '0F AA 02 08 8A 00 01 30 41', '0F AB 04 08 8A 00 00 0F 00 00 00 A0 40',
     '0F AA 04 08 8A 0A 00 00 00 80 7F', '0F AA 04 08 8A 0A 00 00 00 C0 FF',  # infinity, NaN
     '0F AA 04 08 8A 32 00 FF FF FF FF', '0F AA 02 08 8A 32 01 FF FF',  # F8:50, of no row
-    '0F AB 04 08 8A 32 00 FF FF FF FF FF FF', '0F AB 04 08 8A 32 00 00 FF FF FF FF FF',
+    '0F AA 04 08 8A 32 01 00 00 80 3F',  # a half of F8:50, and a half of F8:51
+    '0F A9 04 08 8A 32 FF FF FF FF', '0F AB 04 08 8A 32 00 FF FF FF FF FF FF',
+    '0F AB 04 08 8A 32 00 00 FF FF FF FF FF',
     '0F AA 04 07 89 14 00 71 11 01 00', '0F AA 02 07 89 14 00 00 00', '0F AA 02 07 89 15 00 00 00',
     '0F AA 02 07 89 1E 00 97 00', '0F AA 02 07 89 1E 00 63 00',
     '0F AA 04 07 89 32 00 C0 7F 00 00', '2F AA 02 07 89 0A 00 65 00')
@@ -315,6 +317,7 @@ def test_values_of_guests_keep_the_limits_of_the_rows(access: ShareAccess) -> No
     ('0F 67 00 00 01 00 06 08 00 96 09 94 08 00 00 30 41', False),
     ('0F 67 00 00 01 00 06 14 00 96 09 94 08 FF FF FF FF', False),  # F20:0, of no row
     ('0F 67 00 00 01 00 06 14 00 96 09 94 08 CA F2 49 71', True),
+    ('0F 67 00 00 01 00 06 14 00 94 09 92 08 FF FF', False),  # a float of two bytes
     ('0F 79 01 06 07 28 02 FF FF 01 00', False), ('08 28 00 01 00', True)])
 def test_values_for_a_plc5_keep_the_limits_of_its_rows(text: str, is_good: bool) -> None:
     place = Place(WRITE, rows=limited_rows('PLC5'))
