@@ -69,7 +69,8 @@ def needed(text: str, families: Sequence[str], told: Processor | None = None,
     (('PLC3',), '0F 00 00 00 01 00 2C 0D 00 02 11 22', ALL),
     (('PLC3',), '0F 01 00 00 01 00 2D 04 01 00 00 02', ALL),
     (('PLC3',), '0F 01 00 00 01 00 2C 0B 00 00 02', ALL),
-    (('PLC3',), '0F 01 00 00 01 00 2C 06 00 00 02', READ),
+    *((('PLC3',), f'0F 01 00 00 01 00 2C {section} 00 00 02', READ)
+      for section in ('06', '0A', '0C')),
     # ASCII: "$N7:0", "$S:1", and a symbol.
     *(((*families,), '0F 01 00 00 01 00 00 24 4E 37 3A 30 00 02', READ)
       for families in ((), ('PLC5',), ('SLC',))),
@@ -102,11 +103,15 @@ def needed(text: str, families: Sequence[str], told: Processor | None = None,
     (('PLC5',), '0F 79 01 06 07 00 02 FF FF 01 00', WRITE),
     (('PLC5',), '0F 79 02 06 07 00 04 FF FF FF FF 01 00 00 00 06 09 00 02 FF FF 01 00', WRITE),
     (('PLC5',), '0F 79 02 06 07 00 02 FF FF 01 00 06 02 01 02 FF FF 01 00', ALL),
+    (('PLC5',), '0F 79 01 06 02 16 04 FF FF FF FF 01 00 00 00', WRITE),
+    (('PLC5',), '0F 79 01 06 02 17 04 FF FF FF FF 01 00 00 00', ALL),
+    (('PLC5',), '0F 79 01 06 07 00 03 FF FF FF 01 00 00', ALL),
     (('PLC5',), '0F 79 00', ALL), (('PLC5',), '0F 79 01 06 07 00 02 FF FF 01 00 01', ALL),
     # A file is known by its number, whatever type the command names.
     (('SLC',), '0F AA 02 02 89 01 00 00 20', ALL), (('SLC',), '0F AA 02 07 84 01 00 00 20', ALL),
     (('SLC',), '0F AA 02 00 89 01 00 00 20', ALL), (('SLC',), '0F AA 02 00 8B 01 00 00 20', WRITE),
     (('SLC',), '0F AA 02 01 83 01 00 00 20', WRITE), (('SLC',), '0F A2 02 01 82 01 00', ALL),
+    (('SLC',), '0F AA 02 FF FF 00 89 01 00 00 20', WRITE),
     (('SLC',), '0F AA 02 FF 02 01 89 01 00 00 20', ALL),  # file 258
     (('PLC5',), '0F 00 00 00 01 00 06 FF E8 03 00 11 22', ALL),  # file 1000
     # All types of data files.
