@@ -253,7 +253,7 @@ class DriverBench:
         driver = Driver(self.network, mappings, settings, self.listener)
         before.machine.stop(PortLost(READ_AGAIN), self.line.now)
         driver.take_over(before)
-        self.line.exchange(before.machine, driver.machine)
+        self.line.exchange(before.machine, driver.machine, keeps_port=True)
         self.driver = driver
         self.open()
 

@@ -155,10 +155,16 @@ class VirtualLine:
         self._away[sender] = self.now + seconds
         self._look_at(sender)
 
-    def exchange(self, old: Machine, new: Machine) -> None:
-        """Put another machine in the place of one; it is started by who asks."""
+    def exchange(self, old: Machine, new: Machine, *, keeps_port: bool = False) -> None:
+        """
+        Put another machine in the place of one; it is started by who asks.
+
+        With ``keeps_port`` it gets what is on the way to the other.
+        """
         place = self._machines.index(old)
         self._machines[place] = new
+        if keeps_port:
+            return
         self._arrivals = [entry for entry in self._arrivals if entry[2] != place]
         heapq.heapify(self._arrivals)
         self._away[place] = 0.0

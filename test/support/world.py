@@ -44,12 +44,13 @@ import hashlib
 from itertools import count
 import math
 from random import Random
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 from abdf1_ros.df1.frames import ACK, DLE, Duplex, SOH, stuff, STX
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.settings import LinkSettings, PollingSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave
+from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.guest_rules import ShareAccess
 from abdf1_ros.driver.guests import Guest, GuestCommand
 from abdf1_ros.driver.settings import DriverSettings
@@ -279,6 +280,12 @@ class WatchedPlc:
         self.tags = {place: tag for tag, place in self.places.items()}
         self.place_of = cache(partial(parse_address, plc_type=self.plc.table.plc_type))
 
+    def take_places(self, places: dict[str, str]) -> None:
+        """Take the places of other rows; a place that is left is known as gone."""
+        left = {place: f'gone_{tag.removeprefix("gone_")}' for place, tag in self.tags.items()}
+        self.places = places
+        self.tags = left | {place: tag for tag, place in places.items()}
+
     def word(self, text: str) -> int:
         return int.from_bytes(self.plc.table.read(self.place_of(text), 1), 'little')
 
@@ -319,6 +326,20 @@ class WatchedPlc:
         if tick == ticks(self.stopped):  # it stood so until it ran again
             return self.ran_again if self.plc.is_running else now
         return min(now, (now // STEP - (ticks(now) - tick) % _TICKS + 1) * STEP)
+
+
+class Execute(Protocol):
+    """Executes a command in a PLC; ``is_late`` if a gateway has kept it."""
+
+    def __call__(self, command: Packet, *, is_late: bool = False) -> Packet: ...
+
+
+PassOn = Callable[[WatchedPlc, Execute, Packet], Packet]
+
+
+def is_write(command: Packet) -> bool:
+    """Tell whether a command is a typed write."""
+    return command.data[:1] in _WRITES
 
 
 def ticks(now: float) -> int:
@@ -418,25 +439,27 @@ class World(DriverBench):
 
     ``sent``, ``executed``, ``results`` and ``reads`` only grow. ``published`` tells when each
     message was, by tag and value; a message may be older than the moment in which it comes.
+    ``change`` returns what becomes of the rows of the plant.
     """
 
     odd: tuple[Filter, Filter] = USUAL  # what PLCs hear, and say
 
-    def __init__(self, plant: Plant, seed: int) -> None:
+    def __init__(self, plant: Plant, seed: int,
+                 change: Callable[[list[Mapping]], list[Mapping]] = list) -> None:
         self.plant, self.seed = plant, seed
         self.dice = Random(seed)
         self.drivers = 0  # killed so far
         self.killed_at = 0.0
+        self._killed: list[Driver] = []
         self.others: dict[int, OtherBridge] = {}  # by the station of the PLC
         self.opened = 0.0  # when the port was last
         self.ended = self._dead_until = -math.inf  # when an orderly end began last; after a kill
-        rows = plant.mappings()
+        rows = change(plant.mappings())
         settings = DriverSettings(
             write_timeout=plant.write_timeout, read_only=plant.is_read_only, processor_period=0.0,
             may_store=plant.may_store, first_tns=self.dice.randrange(0x10000))
         super().__init__(rows, network=plant.network, settings=settings, start=False, chunk=_FIFO)
-        self.rows = {row.tag: row for row in rows}
-        self.messages = [row for row in rows if row.tag[0] in 'wfs']
+        self._take_rows(rows)
         # Words that PLCs have taken; and all that they have executed, as station and command.
         self.executed, self.commands = list[Executed](), list[tuple[float, int, Packet]]()
         self.published: dict[tuple[str, int], float] = {}
@@ -450,16 +473,14 @@ class World(DriverBench):
         self.came: dict[str, float] = {}  # when a message of a row came last
         self.youngest: dict[str, float] = {}  # when the last of a row was published
         self.gaps: dict[str, float] = {}  # from when the topic was missing last that is required
-        self.report = make_report(plant.network, rows, settings.default_period,
-                                  max(0.01, plant.scan / 1000))
-        self.bounds = {bound.mapping.tag: bound.seconds for bound in self.report.times.bounds()}
-        self.longest = self.report.times.longest  # s
         self.clocks = Clocks(plant.write_timeout, self.messages, rows)
         self.is_alive = True  # the executor
         self.away = 0.0  # until when the process stands still
         self.ill: dict[int, float] = dict.fromkeys(range(plant.stations + 1), 0.0)
         self.overwritten: dict[str, float] = {}  # when another network has written to an output
         self.holds = 0.0  # how often the gateway keeps a write for a while
+        # What becomes of a command that has come to a PLC, or to the gateway before it.
+        self.pass_on: PassOn = self._keep_some
         self.losses: Losses | None = None
         self.wire = hashlib.sha256()
         self._values = dict.fromkeys(self.rows, 0)
@@ -476,9 +497,6 @@ class World(DriverBench):
         self.sent: list[Sent] = []
         self._last_sent: dict[int, bytes] = {}  # by station
         self._senders: dict[tuple[str, int], int] = {}  # which driver sent a value last, by tag
-        self._begins = {  # how each write begins on the line, by tag without the station
-            row.tag[:-2]: stuff(row.dialect.write(row.address, b'\0\0')[1][:-2])
-            for row in self.rows_of(1, ('w', 'free', 'beat'))}
         self.line.on_send = self._note_sent
         self.line.random = Random(seed)
         self.executor_ran = 0.0
@@ -503,9 +521,7 @@ class World(DriverBench):
     def _watch(self, station: int) -> WatchedPlc:
         plc = self.plc(station, self.plant.kind, ('N7:0', max(24, self.plant.held)), ('N9:0', 8),
                        ('N10:0', 1))
-        places = {row.tag: str(row.address) for row in self.rows.values()
-                  if row.station == station and (row.writes or row.is_heartbeat)}
-        watched = WatchedPlc(plc, places)
+        watched = WatchedPlc(plc, self._places(station))
         if self.plant.scan:
             self._run_ladder(watched)
         serve = plc.serve
@@ -513,11 +529,17 @@ class World(DriverBench):
         def execute(command: Packet, *, is_late: bool = False) -> Packet:
             return self.execute(watched, command, serve, is_late)
 
-        plc.serve = execute  # type: ignore[method-assign]
-        plc.slave = HalfDuplexSlave(
-            LinkSettings(station=self.plant.gateway or station, checksum=self.network.checksum),
-            partial(self._pass_on, execute))
+        def come(command: Packet) -> Packet:
+            return self.pass_on(watched, execute, command)
+
+        plc.serve = come  # type: ignore[method-assign]
+        plc.slave = HalfDuplexSlave(LinkSettings(
+            station=self.plant.gateway or station, checksum=self.network.checksum), come)
         return watched
+
+    def _places(self, station: int) -> dict[str, str]:
+        return {row.tag: str(row.address) for row in self.rows.values()
+                if row.station == station and (row.writes or row.is_heartbeat)}
 
     def _run_ladder(self, watched: WatchedPlc) -> None:
         """Let its ladder run, and somebody who presses its button all the time."""
@@ -591,9 +613,10 @@ class World(DriverBench):
 
         task.reply, task.fail = reply, fail  # type: ignore[method-assign]
 
-    def _pass_on(self, execute: Callable[..., Packet], command: Packet) -> Packet:
+    def _keep_some(self, watched: WatchedPlc, execute: Execute, command: Packet) -> Packet:
         """Let the gateway keep a write for a while, and say that it has not delivered it."""
-        if command.data[:1] not in _WRITES or self.dice.random() >= self.holds:
+        if not is_write(command) or self.network.duplex is not Duplex.HALF \
+                or self.dice.random() >= self.holds:
             return execute(command)
         late = self.dice.uniform(0.0, self.held_for - STEP)
         self.at(self.line.now + late, partial(execute, command, is_late=True))
@@ -610,7 +633,7 @@ class World(DriverBench):
         watched.run_program(self.line.now)
         now = watched.plc.clock()
         self.commands.append((now, watched.plc.station, command))
-        if command.data[:1] not in _WRITES:
+        if not is_write(command):
             return self._read_out(watched, command, serve)
         station = watched.plc.station
         written: list[tuple[str, int, int]] = []
@@ -744,19 +767,28 @@ class World(DriverBench):
 
     def ask(self, station: int, text: str) -> None:
         """Let a guest write a value of its own to a word, of all stations, or what none knows."""
-        dice, value = self.dice, GUESTS[len(self.asked) % len(GUESTS)]
+        dice, value = self.dice, self.next_of_guests
         address = self.plcs[station].place_of(text)
         cmd, data = dialect_of(address.plc_type).write(address, value.to_bytes(2, 'little'))
         if dice.random() < 0.2:
             cmd, data = dice.choice([(0x06, DAMAGED * 50), (0x0F, b'\x68\0\0'), (0x0F, b'\x3A')])
         elif dice.random() < 0.2 and self.network.mode == 'Master':
             station = _ALL
+        self.command(station, cmd, data)
+
+    def command(self, station: int, cmd: int, data: bytes) -> None:
+        """Let a guest send a command; a value of its own is the next of GUESTS."""
         command = Packet(station, 9, cmd, 0, len(self.asked), data)
+        self.asked_at[self.next_of_guests] = self.line.now
         self.asked.append(command)
-        self.asked_at[value] = self.line.now
         self.driver.guests.put(GuestCommand(
-            dice.choice(self._guests), command, self.line.now, self.answered.append))
+            self.dice.choice(self._guests), command, self.line.now, self.answered.append))
         self.line.wake(self.driver.machine)
+
+    @property
+    def next_of_guests(self) -> int:
+        """Return the value that a guest writes next."""
+        return GUESTS[len(self.asked) % len(GUESTS)]
 
     # What goes wrong
 
@@ -785,9 +817,9 @@ class World(DriverBench):
         """Kill the driver; another one begins after a pause."""
         self.drivers += 1
         self.killed_at = self.opened = self.line.now
-        self._settings = replace(self._settings, first_tns=self.dice.randrange(0x10000))
         self.said.clear()
-        self.restart()
+        self._killed.append(self.driver)  # so that no end of its generators says anything
+        self.restart(self.dice.randrange(0x10000))
         self.hold_up(pause)
         self._dead_until = self.away
         self.clocks.forget()
@@ -900,16 +932,34 @@ class World(DriverBench):
             if row.tag.startswith(('clock', 'held')):
                 length = self.dice.choice([row.length, row.length // 2])
                 self.rows[row.tag] = replace(self.rows[row.tag], length=length)
-        self.mappings = [*self.rows.values()]
+        self.use([*self.rows.values()])
+
+    def use(self, rows: Sequence[Mapping]) -> None:
+        """Let a driver of these rows go on, which knows what the driver before it knows."""
+        self._take_rows(rows)
+        for watched in self.plcs.values():
+            watched.take_places(self._places(watched.plc.station))
         self.drivers += 1
         self.killed_at = self.opened = self.line.now
         self.said.clear()
-        self.restart()
+        self.hand_over(rows, self.dice.randrange(0x10000))
+
+    def _take_rows(self, rows: Sequence[Mapping]) -> None:
+        self.rows = {row.tag: row for row in rows}
+        self.messages = [row for row in rows if row.tag[0] in 'wfs']
+        self.report = make_report(self.network, rows, self._settings.default_period,
+                                  max(0.01, self.plant.scan / 1000))
+        self.bounds = {bound.mapping.tag: bound.seconds for bound in self.report.times.bounds()}
+        self.longest = self.report.times.longest  # s
+        self._begins = {  # how each write begins on the line, by tag without the station
+            row.tag[:-2]: stuff(row.dialect.write(row.address, b'\0\0')[1][:-2])
+            for row in rows if row.station == 1 and row.tag.startswith(('w', 'free', 'beat'))}
 
     def rows_of(self, station: int, tags: Sequence[str] = ('w',)) -> list[Mapping]:
-        """Return rows of a PLC whose tags begin so."""
+        """Return rows of a PLC whose tags begin so; of outputs those with Fallback."""
         return [row for row in self.rows.values()
-                if row.station == station and row.tag.startswith(tuple(tags))]
+                if row.station == station and row.tag.startswith(tuple(tags))
+                and (row.fallback or row.tag[0] != 'w')]
 
 
 class OtherBridge(DriverBench):

@@ -22,6 +22,7 @@ outside: at words that PLCs have executed, at values and results, not at the sta
 from __future__ import annotations
 
 from collections import Counter, defaultdict
+from collections.abc import Iterator
 import math
 from operator import attrgetter
 
@@ -32,7 +33,7 @@ from abdf1_ros.df1.radio import LONGEST_WAIT
 from abdf1_ros.driver.write import Outcome, WriteResult
 from abdf1_ros.plan.bounds import MODE_PERIOD
 from abdf1_ros.simulator.ladder import Lamp
-from support.world import Executed, GUESTS, OTHERS, SAFE, Said, Sent, STEP, World
+from support.world import Executed, GUESTS, OTHERS, SAFE, Said, Sent, STEP, WatchedPlc, World
 
 _LEAST_ZERO = 0.5  # s
 _LEAST_LIFE_SIGN = 1.0  # s
@@ -175,7 +176,8 @@ class Ages(Rule):
             return
         published = world.published[tag, entry.value]
         limit = world.plant.write_timeout
-        if tag[0] == 'w':
+        row = world.rows.get(tag)
+        if row is not None and row.fallback:
             limit = min(limit, world.plant.after / 1000)
         self.demand(entry.when - published < limit + _MOMENT, entry, published)
         fallback = self._fallbacks[tag]
@@ -374,7 +376,6 @@ class Withheld(Rule):
 
     def __init__(self, world: World) -> None:
         super().__init__(world)
-        self._rows = [row for row in world.rows.values() if row.is_guarded]
         self._read = dict.fromkeys(world.rows, 0.0)  # when each was published last
         self._begun: dict[tuple[int, int], float] = {}  # when a driver read of a station first
         self._new: set[int] = set()  # stations that were read since the last look
@@ -387,8 +388,8 @@ class Withheld(Rule):
 
     def stand(self) -> None:
         world = self.world
-        for row in self._rows if self._new else ():
-            if row.station in self._new:
+        for row in world.rows.values() if self._new else ():
+            if row.is_guarded and row.station in self._new:
                 point, asked = world.driver.points[row], self._read[f'clock_{row.station}']
                 # At a start that is told when it has had its time to begin.
                 begun = self._begun[row.station, world.drivers]
@@ -406,6 +407,7 @@ class Beats(Rule):
         self._last: dict[str, int] = {}
         self._zero: dict[str, float] = {}  # since when it is 0
         self._untold: set[str] = set()  # those whose last value was not confirmed
+        self._over: set[str] = set()  # those over whose 0 a guest has written
         self._driver: dict[str, int] = {}
         self._stood = max(_LEAST_ZERO, world.plant.period / 1000)
         self._sent: dict[str, Sent] = {}
@@ -422,7 +424,7 @@ class Beats(Rule):
         limit = max(_LEAST_LIFE_SIGN, plant.period / 1000) + _MOMENT
         self.demand(entry.when - world.executor_ran < limit, entry,
                     'while the executor stands still since', world.executor_ran)
-        if plant.requires:
+        if world.rows[entry.tag].condition:
             topic = f'w0_{entry.station}'
             came = world.youngest.get(topic, -math.inf)
             self.demand(entry.when - came < plant.requires / 1000 + _MOMENT, entry,
@@ -433,10 +435,17 @@ class Beats(Rule):
                         entry, 'without 0 although nothing came at', gap)
 
     def executed(self, entry: Executed) -> None:
-        if not entry.tag.startswith(('beat', 'other')) or entry.is_late or entry.value in GUESTS:
+        if not entry.tag.startswith(('beat', 'other')) or entry.is_late:
             return
         tag, value = entry.tag, entry.value
+        if value in GUESTS:
+            if entry.before == 0:
+                self._over.add(tag)
+            return
         last = self._last.get(tag)
+        self.demand(not value or last or tag not in self._over, entry,
+                    'after a guest wrote over the 0')
+        self._over.discard(tag)
         is_ours = tag.startswith('beat')
         if self._driver.get(tag, -1) != (entry.driver if is_ours else 0):
             self.demand(value == 0, entry, 'is the first of a driver')
@@ -525,9 +534,7 @@ class Outputs(Rule):
 
     def __init__(self, world: World) -> None:
         super().__init__(world)
-        self._stood = dict.fromkeys((row.tag for row in world.messages), 0.0)
-        self._rows = [(station, watched, row.tag) for station, watched in world.plcs.items()
-                      for row in world.rows_of(station) if world.bounds[row.tag] is not None]
+        self._stood: defaultdict[str, float] = defaultdict(float)
 
     def told(self, result: WriteResult) -> None:
         tag = result.mapping.tag
@@ -551,8 +558,8 @@ class Outputs(Rule):
         now = world.line.now
         if world.plant.is_read_only:
             return
-        for station, watched, tag in self._rows:
-            limit = (world.bounds[tag] or 0.0) + STEP
+        for station, watched, tag, bound in self._rows():
+            limit = bound + STEP
             calm = max(world.ill[station], world.ill[0])
             brought = watched.brought  # by a download, and seen when it runs or is written again
             if now < max(calm, brought + MODE_PERIOD + _REWRITTEN) + limit:
@@ -564,6 +571,13 @@ class Outputs(Rule):
                 self._stood[tag] = max(self._stood[tag], world.overwritten[tag])
             self.demand(value in (SAFE, 0) or now - self._stood[tag] < limit,
                         tag, value, 'since', self._stood[tag])
+
+    def _rows(self) -> Iterator[tuple[int, WatchedPlc, str, float]]:
+        world = self.world
+        for station, watched in world.plcs.items():
+            for row in world.rows_of(station):
+                if (bound := world.bounds[row.tag]) is not None:
+                    yield station, watched, row.tag, bound
 
 
 class OneResult(Rule):
@@ -636,7 +650,7 @@ class Unheard(Rule):
             tags = [row.tag for row in world.rows_of(station)]
             for tag in tags:
                 since = max(world.deaf_since, world.youngest.get(tag, 0.0))
-                self._demand_rest(tag, now > since + (world.bounds[tag] or math.inf) + STEP)
+                self._demand_rest(tag, now > since + (world.bounds.get(tag) or math.inf) + STEP)
             fell = max(self._fell.get(tag, 0.0) for tag in tags)
             self._demand_rest(f'beat_{station}', world.deaf_since < fell < now - self.flight)
 
@@ -666,7 +680,7 @@ class AfterRun(Rule):
         world = self.world
         now = world.line.now
         for station, watched in world.plcs.items():
-            bound = world.bounds[f'w0_{station}']
+            bound = world.bounds.get(f'w0_{station}')
             if bound is None:
                 continue
             limit = bound - world.plant.after / 1000 + MODE_PERIOD + self.flight
@@ -691,9 +705,8 @@ class Held(Rule):
         if not plant.requires or plant.is_read_only:
             return
         for station, watched in world.plcs.items():
-            beat = f'beat_{station}'
-            wait = world.bounds[f'w0_{station}']
-            if wait is None:
+            beat, wait = f'beat_{station}', world.bounds.get(f'w0_{station}')
+            if wait is None or beat not in world.rows:
                 continue
             limit = plant.requires / 1000 + wait - plant.after / 1000 + STEP
             since = max(world.ill[station], world.ill[0], world.came.get(f'w0_{station}', 0.0))
