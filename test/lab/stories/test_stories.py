@@ -1,0 +1,110 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Short stories of tiny plants, what they reach, and the mistakes that they find."""
+
+from collections.abc import Callable
+from dataclasses import replace
+import math
+from pathlib import Path
+from typing import Any
+from unittest import mock
+
+from abdf1_ros.driver.interlocks.fallback import FallbackRow
+from abdf1_ros.driver.interlocks.queue import Interlocks
+from abdf1_ros.driver.record import OwnWords, WriteRecord
+import pytest
+from stories.scenes import SCENES, SMALL
+from stories.walk import Ledger, shortest, story_of, tell, text_of, Walk
+from support.cases import compare_stored, long_unless
+
+_STORED = Path(__file__).parent / 'stored'
+
+
+def _walked(name: str, deviations: int) -> Walk:
+    walk = Walk(SCENES[name])
+    assert [*walk.to(deviations)] == [*range(deviations + 1)]
+    assert [(text_of(one.story), one.broken) for one in walk.broken] == []
+    return walk
+
+
+# All pairs of the others take minutes: "make long" walks through them.
+@pytest.mark.parametrize(('name', 'deviations'), long_unless(
+    lambda name, deviations: deviations == 1,
+    [*((name, 1) for name in SMALL), ('little end', 2), ('little gets', 2)]))
+def test_all_stories_keep_the_rules_and_reach_what_is_stored(name: str, deviations: int) -> None:
+    walk = _walked(name, deviations)
+    reached = [f'{walk.stories} stories', *sorted(walk.reached)]
+    compare_stored(_STORED / f'{name} {deviations}.txt', '\n'.join(reached) + '\n')
+
+
+@pytest.mark.parametrize(('name', 'text'), [
+    # A lost port and an end: the log has to name the row, also where no heartbeat is mapped.
+    ('little end', 'at 0.95: unplug 0.5\nat 1.25: end 0.3'),
+    # A late command counts from the end of its write, also where the port is lost.
+    ('little sts', 'write 3: kept last\nat 1.75: polling 0.4'),
+    # A guest over a 0 whose next number was refused.
+    ('sts', 'write 3: refused\nat 0.95: guest beat'),
+    # Our own late number after new files.
+    ('sts', 'at 1.25: reload speed gone\nwrite 6: kept last')])
+def test_story_that_was_told_wrongly_once(name: str, text: str) -> None:
+    assert tell_broken(name, text) == ''
+
+
+def _always(value: object) -> Callable[..., object]:
+    return lambda *arguments, **named: value
+
+
+@pytest.mark.parametrize(('owner', 'name', 'made', 'scene', 'story', 'check'), [
+    (OwnWords, 'lands_until', property(_always(-math.inf)), 'little sts', 'write 2: kept last',
+     'Belief'),
+    (WriteRecord, 'take_over', _always(None), 'little gets',
+     'write 1: kept last\nduring 1: reload same', 'Belief'),
+    (WriteRecord, 'gateway_replied', _always(None), 'little free',
+     'at 0.5: before speed last\nwrite 3: not delivered', 'Belief'),
+    (OwnWords, 'plan_again', _always(None), 'little beat', 'write 2: kept last', 'Belief'),
+    (Interlocks, 'unconfirmed', _always([]), 'little end', 'write 2: kept 2\nat 0.95: end 0.3',
+     'Named'),
+    (FallbackRow, 'write_ended', _always(None), 'little sts', '', 'Belief')])
+def test_story_shows_a_mistake(owner: type, name: str, made: Any, scene: str, story: str,
+                               check: str) -> None:
+    assert tell_broken(scene, story) == ''
+    with mock.patch.object(owner, name, made):
+        assert tell_broken(scene, story).startswith(check)
+
+
+def tell_broken(scene: str, story: str) -> str:
+    one = tell(SCENES[scene], story_of(story))
+    assert one is not None
+    return one.broken
+
+
+def test_story_is_its_text_and_is_shortened() -> None:
+    text = 'at 1.2: message\nwrite 2: kept last'
+    assert text_of(story_of(text)) == text
+    with mock.patch.object(OwnWords, 'lands_until', property(_always(-math.inf))):
+        longest = {'at 1.2': 'guest speed', 'write 2': 'kept last'}
+        assert shortest(SCENES['little sts'], longest) == {'write 2': 'kept last'}
+
+
+def test_stories_of_another_tree_are_compared(tmp_path: Path) -> None:
+    one = tell(SCENES['little end'], {})
+    assert one is not None
+    kept = Ledger(None)
+    kept.add(one)
+    kept.write(tmp_path / 'kept.json')
+    before = Ledger(tmp_path / 'kept.json')
+    assert not before.differs(one)
+    assert before.differs(replace(one, came=one.came[1:]))
+    assert before.differs(replace(one, story={'at 0.95': 'message'}))
