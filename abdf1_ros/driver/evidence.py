@@ -31,17 +31,19 @@ class Evidence:
     What a line has shown of a station; as text: the cause and the cure, empty for none.
 
     - ``gateway``: the number of its gateway, None if the station is on the line itself.
+    - ``has_own_ack``: an ACK shows that the station is there. Otherwise a gateway sends it, or the
+      far end of a full-duplex line.
     - ``other_number``: the number to which its replies come in place of ours, None for ours.
     - ``fault``: what is wrong with its replies, None if none of them has come.
-    - ``is_only_acknowledged``: the station has never replied. Its commands were acknowledged, but
-      the ACK was not its own: it came from a gateway, or from the far end of a full-duplex line.
+    - ``is_only_acknowledged``: its commands have had an ACK that is not its own, and no reply.
     """
 
     station: int
-    gateway: int | None = None
-    other_number: int | None = None
-    fault: Message | None = None
-    is_only_acknowledged: bool = False
+    gateway: int | None
+    has_own_ack: bool
+    other_number: int | None
+    fault: Message | None
+    is_only_acknowledged: bool
 
     def __str__(self) -> str:
         """Return the cause and the cure."""
@@ -68,8 +70,9 @@ def evidence_of(mode: LineMode, stations: ActiveStationList, number: int) -> Evi
     """Return what the line has shown of a station."""
     station, via = stations.records[number], stations.via(number)
     gateway = None if via == number else via
-    proves_nothing = mode.waits_for_acks and (mode.has_one_plc or gateway is not None)
+    has_own_ack = mode.is_master and gateway is None
     fault = station.unanswered_by if station.unanswered_by in DAMAGED else None
+    is_unanswered = fault is None and station.unanswered > 0 and not station.replies
     return Evidence(
-        number, gateway, stations.other_number(number), fault,
-        proves_nothing and station.unanswered > 0 and not station.replies)
+        number, gateway, has_own_ack, stations.other_number(number), fault,
+        mode.waits_for_acks and not has_own_ack and is_unanswered)

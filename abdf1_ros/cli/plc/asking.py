@@ -94,7 +94,7 @@ def failed(options: argparse.Namespace, session: Session, error: Abdf1Error, pla
     complain(f'{place and f"{place} of "}station {station}: {error}')
     if isinstance(error, RemoteError):
         check_type(options, session, station)
-    _advise(session, presence.hint(session, error))
+    _advise(session, presence.hint(session, station, error))
     session.is_silent |= isinstance(error, LinkError)
     if options.is_assumed and isinstance(error, LinkError):
         _advise(session, f'no station was given, so {station} was asked; "plc scan" lists the '

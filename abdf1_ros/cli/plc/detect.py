@@ -40,15 +40,17 @@ CHECKS = tuple(check.value for check in (Checksum.CRC, Checksum.BCC))
 
 @dataclass(frozen=True, slots=True)
 class LineSettings:
-    """Settings to try on a line."""
+    """Settings to try on a line; ``own``: our own station, None if the line has it."""
 
     baud: int
     mode: str
     check: str
+    own: int | None = None
 
     def on(self, line: Network) -> Network:
         """Return ``line`` with these settings."""
-        return replace(line, baud=self.baud, mode=self.mode, error_code=self.check)
+        return replace(line, baud=self.baud, mode=self.mode, error_code=self.check,
+                       station=line.station if self.own is None else self.own)
 
     def __str__(self) -> str:
         return f'{self.baud} baud, {_WORDS[self.mode]}, {self.check}'
@@ -83,12 +85,14 @@ class Search:
     Try settings on the port of ``network``, in half duplex with each of ``stations``.
 
     ``show`` gets a text about the settings being tried. ``echoes`` is True if our bytes came back:
-    then there cannot be a full-duplex PLC.
+    then there cannot be a full-duplex PLC. ``acknowledged`` names the settings of a full-duplex
+    port that acknowledges commands, if no station replies; empty if there is none.
     """
 
     def __init__(self, network: Network, stations: Sequence[int],
                  show: Callable[[str], None] = lambda text: None) -> None:
         self.echoes = False
+        self.acknowledged = ''
         self._network = replace(network, nak_retries=0, enq_retries=1,
                                 cmd_timeout=max(500, network.timeout))
         self._stations = stations
@@ -107,6 +111,8 @@ class Search:
         """Return the first settings that work, or None; raises OSError, PortLost."""
         for _, baud, mode in product(range(ROUNDS), bauds, modes):
             found = self._try(baud, mode, checks)
+            if found is None and self.acknowledged and mode == modes[-1]:
+                return None  # with another speed nothing can come
             if found is None:
                 continue
             radio = replace(found.settings, mode='Radio')
@@ -115,7 +121,8 @@ class Search:
             return replace(found, settings=radio) if is_radio else found
         return None
 
-    def _try(self, baud: int, mode: str, checks: Sequence[str]) -> Found | None:
+    def _try(self, baud: int, mode: str, checks: Sequence[str],
+             own: int | None = None) -> Found | None:
         """Try one speed and duplex; in half duplex a second check only after an answer."""
         # Most full-duplex ports accept messages to any station. Most other ports are station 1 or
         # 0.
@@ -124,17 +131,26 @@ class Search:
         for check in checks:
             if self.echoes and mode == MODES['full']:
                 return None
-            heard, gateway = [], None
-            is_first = check == checks[0]
-            for presence in self._look(LineSettings(baud, mode, check), stations, is_first):
+            heard, gateway, other, acknowledged = [], None, None, []
+            settings = LineSettings(baud, mode, check, own)
+            for presence in self._look(settings, stations, check == checks[0]):
                 if presence.is_of_gateway:
-                    gateway = gateway or Found(LineSettings(baud, mode, check), presence)
+                    gateway = gateway or Found(settings, presence)
                 elif presence.takes_commands:
-                    return Found(LineSettings(baud, mode, check), presence)
+                    return Found(settings, presence)
                 elif presence.is_there:
                     heard.append(presence.station)
+                elif presence.is_only_acknowledged:
+                    acknowledged.append(presence.evidence)
+                if own is None and (other := presence.other_number) is not None:
+                    break
             if gateway:
                 return gateway
+            if other is not None:
+                return self._try(baud, mode, [check], other)
+            if len(acknowledged) == len(stations):
+                self.acknowledged = f'{settings}: {acknowledged[0]}'
+                return None
             if mode == MODES['half'] and not heard:
                 return None  # a poll is the same with both checks
             stations = heard or stations
@@ -196,7 +212,9 @@ def found_settings(options: argparse.Namespace,
     progress.clear()
     if search.echoes:
         complain(COMES_BACK)
-    if found is None:
+    if found is None and search.acknowledged:
+        complain(search.acknowledged)
+    elif found is None:
         complain(f'nothing answers with any of these settings, tried {ROUNDS} times')
         for trace in search.traces or [_ALL_TRIED_IN_VAIN] * (not search.echoes):
             complain(trace)

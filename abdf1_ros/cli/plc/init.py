@@ -98,7 +98,7 @@ def nodes_of(gateway: int, mode: str) -> str:
 def net_csv(network: Network, found: Found, stations: Collection[int]) -> str:
     """Return a net CSV with the settings found; our own Station is not in ``stations``."""
     settings = found.settings
-    row = (free_station(network.station, stations), settings.mode, settings.check,
+    row = (free_station(settings.on(network).station, stations), settings.mode, settings.check,
            network.port, settings.baud, network.parity, _TIMEOUT)
     return ('Station,Mode,Error_Code,Com_Port,Baud,Parity,Timeout\n'
             + ','.join(map(str, row)))

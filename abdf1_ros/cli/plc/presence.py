@@ -29,8 +29,10 @@ from abdf1_ros.counters import Counters
 from abdf1_ros.df1.echo import COMES_BACK
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.packet import is_local_status
+from abdf1_ros.driver.evidence import Evidence, evidence_of
 from abdf1_ros.errors import (
     Abdf1Error,
+    CommandTimeout,
     FormatError,
     LinkError,
     PortLost,
@@ -71,6 +73,7 @@ class Presence:
     - ``is_there``: True if the station has sent anything.
     - ``takes_commands``: True if the station understands our frames.
     - ``asked``: number of questions to the station.
+    - ``evidence``: what the line has shown of the station.
     """
 
     station: int
@@ -80,11 +83,22 @@ class Presence:
     is_there: bool
     takes_commands: bool
     asked: int = 1
+    evidence: Evidence | None = None
 
     @property
     def is_settled(self) -> bool:
         """Return True if a reply came, so that another question brings nothing new."""
         return not isinstance(self.error, LinkError)
+
+    @property
+    def is_only_acknowledged(self) -> bool:
+        """Return True if an ACK came that is not the station's own, and no reply."""
+        return self.evidence is not None and self.evidence.is_only_acknowledged
+
+    @property
+    def other_number(self) -> int | None:
+        """Return the number to which the reply came in place of ours, None if it did not."""
+        return None if self.evidence is None or self.is_settled else self.evidence.other_number
 
     @property
     def is_of_gateway(self) -> bool:
@@ -111,15 +125,15 @@ def look_at(session: Session, station: int) -> Presence:
         if error is None and identity.has_no_processor:
             error = FormatError(f'the gateway answers for this station, as {identity}')
         identity = identity if error is None else None
+    evidence = evidence_of(session.network.line_mode, session.stations, station)
     # A gateway answers for a station out of its reach (M 8-2).
     is_reached = not (isinstance(error, RemoteError) and is_local_status(error.sts))
-    # Through another master, only a reply shows that the station is there.
-    is_silent = isinstance(
-        error, LinkError if session.network.line_mode.is_polled else StationInactive)
+    is_silent = isinstance(error, StationInactive) or not evidence.has_own_ack and isinstance(
+        error, LinkError if session.network.line_mode.is_polled else CommandTimeout)
     takes_commands = is_reached and not is_silent
     is_there = takes_commands or (
         is_reached and session.stations[station].last_heard is not None)
-    return Presence(station, seconds, identity, error, is_there, takes_commands)
+    return Presence(station, seconds, identity, error, is_there, takes_commands, evidence=evidence)
 
 
 def _may_be_of_gateway(session: Session, station: int, identity: Identity) -> bool:
@@ -167,7 +181,9 @@ def scan(network: Network, stations: Sequence[int], via: int | None = None,
                 show(f'station {count} of {len(left)}{again(asked)}')
                 heard = counters.chars_received
                 presence = replace(look_at(session, station), asked=asked)
-                if presence.is_settled:
+                # Each command without a reply may cost an SLC with passthru one of its 30 buffers.
+                is_enough = presence.is_only_acknowledged and counters.damaged_frames == damaged
+                if presence.is_settled or is_enough:
                     yield presence
                     continue
                 silent.append(presence)
@@ -188,9 +204,16 @@ def again(asked: int) -> str:
     return f', asked {asked} times' if asked > 1 else ''
 
 
-def tally(found: int, count: int, asked: int) -> str:
-    """Return the number of stations found as text, with the questions to the silent stations."""
+def tally(found: int, count: int, asked: int, acknowledged: int = 0) -> str:
+    """
+    Return the number of stations found as text, with the questions to the silent stations.
+
+    ``acknowledged``: number of stations of which only an ACK came that is not their own.
+    """
     rest = f'; silent stations were asked {asked} times' if found < count and asked > 1 else ''
+    if acknowledged:
+        rest += (f'; of {acknowledged} only an ACK came, which a gateway, an SLC with passthru or '
+                 'a PLC with another number may have sent')
     return f'{found} of {count} stations answer{rest}'
 
 
@@ -267,12 +290,14 @@ def describe(presence: Presence) -> list[str]:
         for name, text, code in lines if text)]
 
 
-def hint(session: Session, error: Abdf1Error) -> str:
-    """Return advice after an error; empty if there is none."""
+def hint(session: Session, station: int, error: Abdf1Error) -> str:
+    """Return advice after an error of a station; empty if there is none."""
     if not isinstance(error, LinkError) or isinstance(error, PortLost):
         return ''
     if session.echoes:
         return COMES_BACK
+    if shown := str(evidence_of(session.network.line_mode, session.stations, station)):
+        return shown
     received, network = session.counters.chars_received, session.network
     if network.line_mode.is_polled and not session.counters.polls_received:
         return (f'no master has polled us, station {network.station}: "plc detect" lists the '

@@ -308,3 +308,27 @@ def test_gateway_in_full_duplex_that_answers_diagnostics_for_all_has_the_nodes_t
     with odd_line(tmp_path / 'radio', device) as name:
         found = scan(Network(com_port=name, mode='Radio', cmd_timeout=2000), [1, 9])
         assert [seen.is_there for seen in found] == [False, True]
+
+
+def test_port_that_only_acknowledges_has_these_settings_and_another_station(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    device = OddDevice(Wiring.FULL, 9)  # an SLC with passthru to Data Highway Plus
+    device.takes = lambda data: Answer.ACK if data[0] == 9 else Answer.LOSES
+    with odd_line(tmp_path / 'line', device) as name:
+        assert main(['detect', '--port', name, '--timeout', '300']) == 1
+        said = capsys.readouterr()
+        assert said.err.splitlines()[-1] == (
+            'plc: 19200 baud, full duplex, CRC: commands to station 1 are acknowledged, and no '
+            'reply comes: is the number right? An SLC with passthru, or a gateway, acknowledges '
+            'commands for all stations; "plc scan 0-63" shows which stations reply')
+        assert 'nothing answers' not in said.err
+        assert main(['detect', '--port', name, '--timeout', '300', '--stations', '9']) == 0
+
+
+def test_number_to_which_a_gateway_replies_becomes_our_station(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    device = OddDevice(Wiring.FULL, 8, (0, 1))
+    device.replies_to = 8
+    said = detected(tmp_path / 'line', device, capsys)
+    assert '--own-station 8' in said
+    assert 'net.csv:\nStation,Mode,Error_Code,Com_Port,Baud,Parity,Timeout\n8,Peer,CRC' in said

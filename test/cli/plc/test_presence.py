@@ -36,6 +36,7 @@ from abdf1_ros.cli.plc.presence import (
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.errors import FormatError, RemoteError, StationInactive
 from abdf1_ros.pccc.identity import Identity, Mode
 from abdf1_ros.ports.descriptor import PortAround
@@ -43,7 +44,7 @@ from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.gateway import SimulatedGateway
 import pytest
 from support.driver_bench import simulated_plc
-from support.odd_device import OddDevice, Wiring
+from support.odd_device import Answer, OddDevice, Wiring
 from support.plc_line import Leap, LosesPolls, LOSSY, odd_line, plc_line
 from support.ptys import Pty
 
@@ -101,17 +102,17 @@ def test_silence_and_noise(tmp_path: Path, mode: str) -> None:
         assert not seen.takes_commands
         duplex = 'full' if mode == 'Peer' else 'half'
         asked = f'asked with 9600 baud, parity None, {duplex} duplex, CRC: '
-        assert hint(session, seen.error) == (
+        assert hint(session, 1, seen.error) == (
             f'{asked}not one character came: station (a PLC-5 shows its own in octal), check or '
             'duplex wrong? Then cable, port, power, baud rate and parity. "plc detect" tries '
             'other settings')
         line.write(b'\x55\xaa\x00')
         seen = look_at(session, 1)
         assert seen.error is not None
-        assert hint(session, seen.error).startswith(f'{asked}3 characters came, but no answer')
-        assert hint(session, FormatError('x')) == ''
+        assert hint(session, 1, seen.error).startswith(f'{asked}3 characters came, but no answer')
+        assert hint(session, 1, FormatError('x')) == ''
         session.counters.acks_received = 1  # somebody understands us
-        assert hint(session, seen.error) == ''
+        assert hint(session, 1, seen.error) == ''
     line.close()
 
 
@@ -132,6 +133,7 @@ def test_time_of_an_answer_begins_when_the_line_takes_commands(
     class Slow:
         now = 0.0
         network = Network()
+        stations = ActiveStationList()
 
         def settle(self) -> None:
             self.now += 0.1
@@ -269,3 +271,53 @@ def test_scan_says_what_came_where_noise_makes_symbols_of_the_answers(
     said = capsys.readouterr()
     assert '0 of 2 stations answer; silent stations were asked 4 times' in said.out
     assert 'received: 8 characters, 0 damaged frames, 0 NAK' in said.err
+
+
+def passthru(station: int = 9) -> OddDevice:
+    """Return an SLC of this number with passthru: it acknowledges commands for all stations."""
+    device = OddDevice(Wiring.FULL, station)
+    device.takes = lambda data: Answer.ACK if data[0] == station else Answer.LOSES
+    return device
+
+
+def test_acknowledgement_of_an_slc_with_passthru_is_no_answer_of_a_station(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    device, asked, takes = passthru(), list[int](), passthru().takes
+    device.takes = lambda data: (asked.append(data[0]), takes(data))[1]
+    with odd_line(tmp_path / 'line', device) as name:
+        assert main(['scan', '8-10', '--peer', '--port', name]) == 0
+    said = capsys.readouterr().out.splitlines()
+    assert [line.split()[:1] for line in said[1:-1]] == [['9']]
+    assert said[-1] == (
+        '1 of 3 stations answer; of 2 only an ACK came, which a gateway, an SLC with passthru or '
+        'a PLC with another number may have sent')
+    assert asked == [8, 9, 10]  # each question without a reply may cost a buffer of the SLC
+
+
+def test_acknowledgement_of_a_gateway_is_no_answer_of_its_node(tmp_path: Path) -> None:
+    device = OddDevice(Wiring.HALF, 8, (9,))
+    device.takes = lambda data: Answer.ACK if data[0] == 9 else Answer.LOSES
+    with odd_line(tmp_path / 'line', device) as name:
+        found = list(scan(Network(com_port=name, timeout=300, cmd_timeout=500), [9, 10], via=8))
+    assert [(seen.station, seen.is_there, seen.is_only_acknowledged) for seen in found] == [
+        (9, True, False), (10, False, True)]
+
+
+def far_gateway() -> OddDevice:
+    """Return a KF3 in full duplex: the replies of its PLC come to its own number, 8."""
+    device = OddDevice(Wiring.FULL, 8, (1,))
+    device.replies_to = 8
+    return device
+
+
+@pytest.mark.parametrize('command', [
+    ('scan', '0-31'), ('read', 'N7:0', '--plc-type', 'SLC'), ('ping', '1')])
+def test_number_to_which_a_gateway_replies_is_named(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str], command: tuple[str, ...]) -> None:
+    with odd_line(tmp_path / 'line', far_gateway()) as name:
+        line = (*command, '--peer', '--port', name)
+        assert main(line) == 1
+        said = capsys.readouterr()
+        assert 'replies come to number 8, not to ours' in said.err
+        assert '--own-station 8' in said.err
+        assert main([*line, '--own-station', '8']) == 0

@@ -65,8 +65,9 @@ def run(options: argparse.Namespace) -> int:
     if there.is_of_gateway:
         print(_BEHIND_GATEWAY)
     parity = '' if network.parity == 'None' else f' --parity {network.parity}'
+    own = '' if settings.own is None else f' --own-station {settings.own}'
     print(f'next: {called("plc")} {_first_task(found)} --port {network.port} '
-          f'--baud {settings.baud} --check {settings.check}{parity}')
+          f'--baud {settings.baud} --check {settings.check}{parity}{own}')
     print(f'net.csv:\n{init.net_csv(network, found, [there.station])}')
     return 0
 

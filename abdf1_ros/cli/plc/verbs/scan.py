@@ -43,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Ask the stations, and print those that answer."""
     progress = Progress()
-    found = 0
+    found = acknowledged = 0
     asked = 1
     network = network_of(options)
     for there in presence.scan(
@@ -55,10 +55,15 @@ def run(options: argparse.Namespace) -> int:
             progress.clear()
             print(f'{there.station:7}  {there.seconds * 1000:5.0f} ms  {there}'
                   f'{presence.again(there.asked)}', flush=True)
+        elif there.other_number is not None:  # which is so for all stations
+            progress.clear()
+            complain(str(there.evidence))
+            return EXIT_FAILED
         else:
-            asked = there.asked
+            acknowledged += there.is_only_acknowledged
+            asked = max(asked, there.asked)
     progress.clear()
-    print(presence.tally(found, len(options.stations), asked))
+    print(presence.tally(found, len(options.stations), asked, acknowledged))
     if found > 1 and network.mode == MODES['full']:
         print(_ONE_PLC_ANSWERS_TO_ALL)
     return 0 if found else EXIT_FAILED
