@@ -23,7 +23,7 @@ from dataclasses import dataclass
 
 from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings.mapping import Mapping
-from abdf1_ros.text import first
+from abdf1_ros.text import first, printable
 
 # The topics that belong to no row; only we publish them.
 _OWN = ('~/write_results', '~/active_stations', '~/snapshot')
@@ -62,6 +62,23 @@ class TopicNames:
     def published(self) -> tuple[str, ...]:
         """Return the topics that only this bridge may publish."""
         return *self.read.values(), *self.own
+
+    def idle(self, our_name: str, remapped: Iterable[str]) -> Iterator[str]:
+        """
+        Yield why remaps of read and write topics have no effect; ROS does not report this.
+
+        ``remapped``: the names that the user has remapped; ``our_name``: of the node.
+        """
+        ours = {f'~/read/{topic}' for topic in self.read} | {
+            f'~/write/{topic}' for topic in self.written}
+        for name in remapped:
+            below = name.removeprefix('~').removeprefix(our_name).strip('/')
+            right = f'~/{below}'
+            if not below.startswith(('read/', 'write/')) or \
+                    right in ours and name in (right, f'{our_name}/{below}'):
+                continue
+            yield f'the remap of {printable(name)} has no effect: ' + (
+                f'write {right}' if right in ours else 'no row has this topic')
 
     def _doubles(self) -> Iterator[Problem]:
         owners = defaultdict[str, list[str]](list)

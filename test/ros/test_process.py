@@ -160,10 +160,12 @@ def test_names_can_be_remapped(observer: ros.Observer, files: Files) -> None:
     door = observer.listen(msg.UInt8MultiArray, '/cell/door_closed')
     bits = observer.listen(msg.UInt8MultiArray, '/cell/line_a/read/bits')
     active = observer.listen(msg.UInt16MultiArray, '/cell/line_a/active_stations')
-    remaps = ('-r', '__ns:=/cell', '-r', '__node:=line_a', '-r', '~/read/door:=/cell/door_closed')
+    remaps = ('-r', '__ns:=/cell', '-r', '__node:=line_a', '-r', '~/read/door:=/cell/door_closed',
+              '-r', 'read/bits:=/cell/bits')
     with files.start_simulator() as simulator, \
             ros.Process('node', *files.args('use_sim_time:=true', 'map.recipe.max:=5',
                                             'send_in_sequence:=true'), *remaps) as node:
+        node.wait_for('[WARN] ', 'the remap of read/bits has no effect: write ~/read/bits')
         node.wait_for('[WARN] ', 'without effect', ': map.recipe.max')
         node.wait_for('[WARN] ', 'send_in_sequence without effect: only for Mode Master')
         assert ros.values_in(door.first()) == [1]

@@ -23,6 +23,7 @@ from abdf1_ros.ros.diagnostics.graph import Graph
 from abdf1_ros.ros.diagnostics.other_publishers import OtherPublisherWatch, StrayWatch
 from abdf1_ros.ros.diagnostics.status import Seen
 from abdf1_ros.ros.diagnostics.topics import TopicsStatus
+from abdf1_ros.ros.parameters.arguments import Arguments
 from abdf1_ros.ros.topic_names import TopicNames
 import pytest
 from support.cases import for_all
@@ -70,6 +71,21 @@ def test_two_topics_of_one_name_are_a_fault(
             f'remaps: {topics} have one name, {name}; give each topic a name of its own']
     else:
         raise AssertionError(f'{remaps} are accepted')
+
+
+@for_all(('remapped', 'reason'), [
+    ('~/read/door', ''), ('/press/read/door', ''), ('~/write/speed', ''),
+    ('press:~/read/door', ''), ('other:read/door', ''),
+    ('/other/read/door', ''), ('__node', ''), ('rosservice://~/read/door', ''), ('~/reload', ''),
+    ('read/door', 'write ~/read/door'), ('/read/door', 'write ~/read/door'),
+    ('press:read/door', 'write ~/read/door'), ('~read/door', 'write ~/read/door'),
+    ('~/write/door', 'no row has this topic'), ('~/read/dor', 'no row has this topic'),
+    ('/press/read/dor', 'no row has this topic')])
+def test_remap_without_effect_is_told(remapped: str, reason: str) -> None:
+    arguments = Arguments.of(['node', '--ros-args', '--remap', f'{remapped}:=/cell/door'])
+    name = remapped.rpartition(':')[2]
+    assert [*names().idle('/press', arguments.remapped_for('/press'))] == [
+        f'the remap of {name} has no effect: {reason}' for _ in range(bool(reason))]
 
 
 class Domain:

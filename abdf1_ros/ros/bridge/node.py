@@ -92,7 +92,10 @@ class BridgeNode(AnsweringNode):
             (port_owners or PortOwners()).hold, self.get_fully_qualified_name())
         try:
             configuration = configure(self, arguments)
-            TopicNames.of(self.resolve_topic_name, configuration.mappings)
+            names = TopicNames.of(self.resolve_topic_name, configuration.mappings)
+            our_name = self.get_fully_qualified_name()
+            for text in names.idle(our_name, arguments.remapped_for(our_name)):
+                self.get_logger().warning(text)
             self._shown = ShownFiles(self)
             self._shown.show(configuration.network, configuration.shown_rows())
             self._hold_ports(*configuration.held)

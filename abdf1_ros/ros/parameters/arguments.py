@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The parameters that a process was given, and the node that each of them is for."""
+"""The parameters and remaps that a process was given, and the node that each of them is for."""
 
 from __future__ import annotations
 
@@ -46,31 +46,38 @@ class Typed:
 @dataclass(frozen=True, slots=True)
 class Arguments:
     """
-    The parameters that a process was given, for all of its nodes.
+    The parameters and remaps that a process was given, for all of its nodes.
 
     - ``files``: paths of parameter files
     - ``typed``: parameters of the command line
     - ``others``: full names of all nodes of the process, if it has several
+    - ``remaps``: the left sides of remaps, such as ``~/read/door``, after the name of a node and
+      a colon if the remap is for this node only
     """
 
     files: Sequence[str] = ()
     typed: Sequence[Typed] = ()
     others: Collection[str] = ()
+    remaps: Sequence[str] = ()
 
     @classmethod
     def of(cls, args: Sequence[str], others: Collection[str] = ()) -> Arguments:
         """Return the parameters in the arguments of a process."""
-        rules = [rule.partition(':=') for option, rule in zip(args, args[1:], strict=False)
-                 if option in ('-p', '--param')]
         typed = []
-        for left, _, value in rules:
+        for left, _, value in _rules(args, '-p', '--param'):
             node, _, name = left.rpartition(':')
             typed.append(Typed(node.strip('/'), name, value))
-        return cls(parameter_files(args), typed, others)
+        return cls(parameter_files(args), typed, others,
+                   [left for left, _, _ in _rules(args, '-r', '--remap')])
 
     def typed_for(self, full_name: str) -> dict[str, str]:
         """Return the command line's parameters for a node, as text."""
         return {typed.name: typed.value for typed in self.typed if typed.is_for(full_name)}
+
+    def remapped_for(self, full_name: str) -> list[str]:
+        """Return the names that remaps replace in a node."""
+        pairs = (left.rpartition(':') for left in self.remaps if '://' not in left)
+        return [name for node, _, name in pairs if node in ('', _base(full_name))]
 
     def only_for(self, full_name: str) -> set[str]:
         """Return the names on the command line that only this node of the process gets."""
@@ -107,6 +114,12 @@ class Arguments:
                          and _base(name) in (_base(full_name), usual_name)):
                 yield Problem(Place(path, line), _advice(name, full_name, found))
                 return
+
+
+def _rules(args: Sequence[str], *options: str) -> list[tuple[str, str, str]]:
+    """Return the rules after one of the options: left side, ":=", right side."""
+    return [rule.partition(':=') for option, rule in zip(args, args[1:], strict=False)
+            if option in options]
 
 
 def is_for(section: str, full_name: str) -> bool:
