@@ -119,10 +119,12 @@ class NeverTaken(LinkError):
 
 
 class CommandExpired(LinkError):
-    """The command was too old to be sent, or to be repeated."""
+    """The command must not be sent any more, or repeated: it is too old, or for the argument."""
 
     def words(self) -> str:
         """Return this text; the specification has no number for it."""
+        if self.args:
+            return str(self.args[0])
         return 'too old to be sent once more' if self.sent else 'too old to be sent'
 
 

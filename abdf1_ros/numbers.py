@@ -104,6 +104,9 @@ def one_of(known: Mapping[str, _T], spelled: Callable[[str], object] = str.lower
                      choices=choices)
 
 
+YES_OR_NO = one_of({'Yes': True, 'No': False})
+
+
 @functools.cache
 def member_of(kind: type[_Member]) -> ValueKind[_Member]:
     """Return the kind of the members of an enumeration, by value."""

@@ -211,10 +211,12 @@ OUTCOMES: dict[Outcome, str] = {
     Outcome.SUPERSEDED: 'Words and floats: a newer message came while this one waited. Bits: '
                         'newer changes wait, and the line does not carry them all.',
     Outcome.REFUSED: 'Wrong length, outside Min and Max, not representable, `read_only`, port not '
-                     'open: nothing was sent. The reason follows.',
+                     'open, or `more than one publisher` of a row with Single_Publisher: nothing '
+                     'was sent. The reason follows.',
     Outcome.NOT_SENT: 'The station is inactive, or its replies were too late before; the port was '
                       'lost; or the message waited longer than `write_timeout`. `fallback`: the '
-                      'message was published before a fallback value went out.',
+                      'message was published before a fallback value went out. `more than one '
+                      'publisher`: the message waited when a second publisher came.',
     Outcome.FAILED: "The PLC's own error follows, as STS and in words.",
     Outcome.PARTLY: 'A write of several packets failed after some of them. If a reply is missing, '
                     'the values are read back, as for the next outcome.',
@@ -222,7 +224,7 @@ OUTCOMES: dict[Outcome, str] = {
                      'with the result of the next read, within `write_timeout`: `read back: the '
                      'PLC holds the value`, `... another value`, or why nothing was read.',
     Outcome.FALLBACK: 'A fallback value, without a message. Reason: `timeout` (no message in '
-                      'time), `start`, `return` of the station, its change to `run`, or our own '
-                      '`end`.',
+                      'time), `start`, `return` of the station, its change to `run`, our own '
+                      '`end`, or more than one of the `publishers`.',
 }
 """The outcomes of a write with their meaning."""

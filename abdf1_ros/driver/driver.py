@@ -32,6 +32,7 @@ commands of jobs under way                          ``job_tasks.JobTasks``
 when an own row has to be looked at                 its ``due``; the first of a PLC in ``Plc.due``
 how a PLC answers our own writes, a change to RUN   ``interlocks.plc.Plc``
 last message of a topic, executor, the end          ``interlocks.plc.Conditions``
+whether a topic has more than one publisher         ``interlocks.plc.Conditions``
 mode and type of a PLC                              ``checks.Checks.known``
 whether a station answers                           ``df1.stations.Station``
 last value, freshness, withheld                     ``reads.point.ReadPoint``
@@ -42,6 +43,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Container, Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Protocol
 
 from abdf1_ros.counters import Counters
@@ -69,7 +71,7 @@ from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome, show, Write, WriteResult
 from abdf1_ros.driver.writes.queue import MAX_WAITING_WRITES, WriteQueue
 from abdf1_ros.driver.writes.standing import Standing
-from abdf1_ros.driver.writes.under_way import WritesUnderWay
+from abdf1_ros.driver.writes.under_way import is_message_of, WritesUnderWay
 from abdf1_ros.errors import FormatError, INTERNAL_ERROR, PortLost
 from abdf1_ros.messages import Event
 from abdf1_ros.pccc.extent import OUR_TABLE
@@ -319,7 +321,13 @@ class Driver:
 
     def _sort_inbox(self, now: float) -> None:
         """Store messages of Serve rows in our table; let all others wait for the line."""
+        for mapping, why in self.interlocks.new_crowds(now):
+            self._writes.drop(why, now, mapping)
+            self.tasks.stop(partial(is_message_of, mapping), why)
         for write in self._inbox.take():
+            if reason := self.interlocks.why_refused(write):
+                self._end_write(write, Outcome.REFUSED, reason)
+                continue
             if self.interlocks.is_overruled(write):
                 self._end_write(write, Outcome.NOT_SENT, 'fallback')
                 continue

@@ -67,6 +67,7 @@ class Job:
       also end expired jobs, so that their results are not late.
     - ``patience``: a later command expires this many seconds after the reply to the command
       before it, but not after ``latest`` (clock value in s). A pause of the process counts.
+    - ``why_stopped``: why no further command may be sent, empty if it may.
     - ``is_probe``: a silent station is asked whether it answers again.
     - ``is_own``: a heartbeat or a fallback, which no message has asked for.
     - ``key``: what fails if the job fails again and again, None for nothing: see ``df1.odd``.
@@ -85,6 +86,7 @@ class Job:
     expires = math.inf
     patience = 0.0
     latest = math.inf
+    why_stopped = ''
     is_probe = False
     is_own = False
     is_whole = True
@@ -134,6 +136,8 @@ class Job:
         """Raise ``error`` in the steps, unless they have ended."""
         if getgeneratorstate(self._steps) == GEN_CLOSED:  # closed by the garbage collector
             return
+        if self.why_stopped and isinstance(error, CommandExpired):
+            error = CommandExpired(self.why_stopped)
         # A copy of the error for this job: a lost port fails all jobs with the same error.
         found = type(error)(*error.args, sent=self.sent, cause=error.cause)
         if self.key is not None:
@@ -239,8 +243,17 @@ class JobTasks:
             self._stop_waiting(job)
             job.fail(StationInactive(job.station))
 
+    def stop(self, is_meant: Callable[[Job], bool], why: str) -> None:
+        """Let jobs that are meant send no further command, for the reason ``why``."""
+        for job in filter(is_meant, self.under_way):
+            job.why_stopped, job.expires, job.latest = why, -math.inf, -math.inf
+        self._plan()
+
     def _stop_waiting(self, job: Job) -> None:
         self.waiting.remove(job)
+        self._plan()
+
+    def _plan(self) -> None:
         self.next_expiry = min((job.expires for job in self.waiting), default=math.inf)
 
     def fail(self, error: LinkError) -> None:

@@ -38,6 +38,7 @@ from abdf1_ros.plan import bounds, forecast
 from abdf1_ros.plan.bounds import OURS_BESIDE_GUESTS, Times
 from abdf1_ros.plan.planner import Block, Planner, StationArea
 from abdf1_ros.settings import BAUD_RATES
+from abdf1_ros.settings.heartbeats import LONGEST_LEASE, NODE_LEASE
 from abdf1_ros.settings.mapping import Command, Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.remarks import network_remarks
@@ -188,6 +189,7 @@ class Report:
                          f'would make all slaves drop what they have queued: {"; ".join(lost)}')
         if gaps := '; '.join(_unprotected(self.mappings)):
             found.append(f'nothing protects: {gaps}')
+        found += _publisher_notes(self.mappings.fallbacks)
         return found
 
     def _on_demand(self) -> str:
@@ -240,6 +242,18 @@ def _unprotected(mappings: Rows) -> Iterator[str]:
     if pushed:
         yield ('topics of Serve rows without Period, so a PLC that stops is not noticed: '
                f'{_tags(pushed)}')
+
+
+def _publisher_notes(fallbacks: Rows) -> Iterator[str]:
+    """Yield a note on how many publishers rows with Fallback may have (rules 20 and 28)."""
+    killed = (f'a killed publisher counts for {NODE_LEASE} s, or for {LONGEST_LEASE:g} s if it '
+              f'offers a liveliness lease of {LONGEST_LEASE:g} s or less')
+    if many := [mapping for mapping in fallbacks if not mapping.single_publisher]:
+        yield (f'rows with Fallback that take messages of any number of publishers: {_tags(many)}'
+               '; Single_Publisher Yes refuses all messages while more than one publisher is '
+               f'alive; {killed}')
+    elif fallbacks:
+        yield f'Single_Publisher: {killed}'
 
 
 def make_report(network: Network, mappings: Iterable[Mapping], default_period: float,

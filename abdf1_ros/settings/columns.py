@@ -30,6 +30,7 @@ from abdf1_ros.numbers import (
     two_readings,
     ValueKind,
     whole,
+    YES_OR_NO,
 )
 from abdf1_ros.pccc.spellings import type_name
 from abdf1_ros.pccc.values import ValueType, WordOrder
@@ -138,6 +139,8 @@ def _value_of(mapping: Mapping, attribute: str) -> object:
 
 
 def _text(value: object) -> str:
+    if isinstance(value, bool):
+        return 'Yes' if value else ''
     if isinstance(value, float):
         return '' if math.isinf(value) else f'{value:.15g}'
     return '' if value is None else str(value.value if isinstance(value, Enum) else value)
@@ -237,6 +240,10 @@ MAP_COLUMNS = (
            'a message, the value is written again only after this time',
            kind=milliseconds_from(100, 3_600_000),
            commands=(Command.WRITE, Command.READ_WRITE)),
+    Column('Single_Publisher', 'No',
+           'Yes: while the topic of a row with Fallback has more than one publisher, all its '
+           'messages are refused, and the Fallback is written',
+           kind=YES_OR_NO, commands=(Command.WRITE, Command.SERVE)),
 )
 
 BY_NAME = {column.name: column for column in MAP_COLUMNS}

@@ -74,6 +74,9 @@ def with_conditions(row: Row, values: Checked, mapping: Mapping, fault: ReportFa
         fault('Write_Again', 'no station confirms what is written to 255', is_superfluous=True)
     if mapping.alarm is not None and mapping.type is not ValueType.BOOL:
         fault('Alarm', 'Alarm is for bits (bool), such as B3:0/0')
+    if mapping.single_publisher and not row.get('Fallback'):
+        fault('Single_Publisher', 'Single_Publisher is for rows with Fallback: without one the '
+                                  'last value would stand while messages are refused')
     return replace(mapping, fallback=_fallback(values, mapping, fault),
                    condition=_condition(values, mapping, fault))
 

@@ -62,6 +62,12 @@ It is short, because a caller of ~/polling or ~/reload waits.
 LEAST_REFRESH = 5.0
 """Least time (s) after which a confirmed fallback value is written again (rule 8)."""
 
+LONGEST_LEASE = 2.0
+"""Longest liveliness lease (s) of a publisher whose death counts after this lease (rule 28)."""
+
+NODE_LEASE = 20
+"""Time (s) after which DDS drops a killed node, and its publishers that offer no such lease."""
+
 _COUNTING = (ValueType.INT16, ValueType.UINT16)
 
 

@@ -79,6 +79,7 @@ class Mapping:
     - ``alarm``, ``fallback``, ``condition``: None where the row has none.
     - ``deadband``: largest difference that is not published, in the unit of the topic.
     - ``max_silence``: ms after which an unchanged value is published again.
+    - ``single_publisher``: no message is taken while the topic has more than one publisher.
     - ``write_again``: ms after which a value that the PLC holds is written again.
     - ``confirms``: tag of the heartbeat whose control the bit confirms, empty for none.
     - ``description``: free text.
@@ -115,6 +116,7 @@ class Mapping:
     deadband: float | None = None
     max_silence: int | None = None
     write_again: int | None = None
+    single_publisher: bool = False
     remarks: tuple[Problem, ...] = ()
     # The codec and the dialect are made once: every read needs them.
     codec: Codec = field(init=False, repr=False)

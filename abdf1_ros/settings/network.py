@@ -34,7 +34,15 @@ from abdf1_ros.df1.settings import LinkOptions, LinkSettings
 from abdf1_ros.df1.stations import MAX_STATION
 from abdf1_ros.line_names import device_of, MOST_PORT
 from abdf1_ros.messages import Message
-from abdf1_ros.numbers import is_digits, one_of, TEXT, ValueKind, whole, whole_number
+from abdf1_ros.numbers import (
+    is_digits,
+    one_of,
+    TEXT,
+    ValueKind,
+    whole,
+    whole_number,
+    YES_OR_NO,
+)
 from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.spellings import family_name
 from abdf1_ros.problems import ConfigurationError, Place, Problem
@@ -108,7 +116,6 @@ def _named(*names: str) -> ValueKind[str]:
     return one_of({name: name for name in names})
 
 
-_YES = one_of({'Yes': True, 'No': False})
 # S0 prints the default, None, as a dash.
 _PARITY = one_of({name: name for name in PARITIES}, lambda text: text.lower().replace('-', 'none'))
 
@@ -151,7 +158,7 @@ class Network:
         'Timeout', 1000, 'ms to wait for each answer of a station', whole(0, 360000, 'ms'))
     tx_delay: int = _net(
         'TX_Delay', 0, 'ms to wait before each transmission', whole(0, 65535, 'ms'))
-    handshake: bool = _net('Handshake', False, 'hardware handshake RTS/CTS', _YES)
+    handshake: bool = _net('Handshake', False, 'hardware handshake RTS/CTS', YES_OR_NO)
     polling: str = _net('Polling', 'Message', 'how a master polls', _named(*POLLING_MODES))
     share: str = _net(
         'Share', '', 'places where other programs connect to share the line, separated by blanks: '
@@ -164,7 +171,7 @@ class Network:
         'for broadcasts')
     collision_avoidance: bool = _net(
         'Collision_Avoidance', False, 'Mode Radio: Yes if the radios avoid collisions and buffer '
-        'both directions; then commands may go to several stations at a time', _YES)
+        'both directions; then commands may go to several stations at a time', YES_OR_NO)
     listen_port: str = _net(
         'Listen_Port', '', 'Mode Listen: the second device, if each direction of the line has its '
         'own wire')

@@ -20,7 +20,7 @@ from unittest.mock import Mock
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.driver.job_tasks import Job, JobTasks
 from abdf1_ros.driver.write import Outcome
-from abdf1_ros.errors import CommandTimeout, PortLost
+from abdf1_ros.errors import CommandExpired, CommandTimeout, PortLost
 from abdf1_ros.pccc.dialect import Steps
 import pytest
 from support.cases import for_all
@@ -102,6 +102,24 @@ def test_all_jobs_end_with_the_port() -> None:
     tasks.fail(PortLost('unplugged'))
     assert [str(error) for job in jobs for error in job.errors] == ['port lost: unplugged'] * 2
     assert (tasks.first(()), tasks.next_expiry) == (None, math.inf)
+
+
+@for_all('sent', [False, True])
+def test_job_that_is_stopped_sends_no_further_command_and_says_why(sent: bool) -> None:
+    jobs, tasks = [TwoRequests(patience=9.0) for _ in range(4)], JobTasks(OURS, 0, LINE)
+    for job in jobs:
+        job.start(tasks, NOW).sent = sent
+    jobs[0].reply(jobs[0].command.reply(b'one'))  # its second command waits
+    tasks.stop(lambda job: job not in jobs[2:], 'somebody else')
+    assert tasks.next_expiry == -math.inf
+    jobs[1].reply(jobs[1].command.reply(b'one'))
+    tasks.expire(NOW)
+    assert [[*map(str, job.errors)] for job in jobs] == [['somebody else']] * 2 + [[]] * 2
+    tasks.stop(lambda job: True, 'somebody else')
+    jobs[2].fail(CommandTimeout())  # it was sent, which says more
+    assert [type(error) for error in jobs[2].errors] == [CommandTimeout]
+    jobs[3].fail(CommandExpired())  # the link was about to send it
+    assert [*map(str, jobs[3].errors)] == ['somebody else']
 
 
 def test_error_in_a_job_ends_it() -> None:

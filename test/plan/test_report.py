@@ -290,11 +290,14 @@ def test_members_of_structures_apart_are_compared_with_whole_elements() -> None:
 
 def test_rule_20_what_nothing_protects_is_one_note() -> None:
     fallback = Fallback((0,), 2000)
-    guarded = [make_mapping('N10:1', 'Write', tag='speed', fallback=fallback, station=2),
+    guarded = [make_mapping('N10:1', 'Write', tag='speed', fallback=fallback, station=2,
+                            single_publisher=True),
                make_mapping('N10:0', 'Heartbeat', tag='beat', period=1000,
                             condition=While(('speed',), 10_000)),
                make_mapping('N7:9', 'Serve', station=5, tag='pushed', period=1000)]
-    assert report_of(*guarded, mode='Peer').notes() == []
+    killed = ('a killed publisher counts for 20 s, or for 2 s if it offers a liveliness lease of '
+              '2 s or less')
+    assert report_of(*guarded, mode='Peer').notes() == [f'Single_Publisher: {killed}']
     bare = [make_mapping('N7:1', 'Write', tag='word'), make_mapping('B3:0/2', 'Write', tag='bit'),
             make_mapping('N7:3', 'ReadWrite', tag='recipe'),
             make_mapping('O:001', 'Write', tag='lamp'),
@@ -303,12 +306,19 @@ def test_rule_20_what_nothing_protects_is_one_note() -> None:
             make_mapping('N10:6', 'Heartbeat', tag='slow', period=1000,
                          condition=While(('speed',), 10_001)),
             make_mapping('N7:8', 'Serve', station=5, tag='silent')]
-    note, = report_of(*guarded, *bare, mode='Peer').notes()
+    note, _ = report_of(*guarded, *bare, mode='Peer').notes()
     assert note == (
         'nothing protects: 4 of 5 written rows, without Fallback: lamp, bit, word and 1 more; '
         'heartbeats without While, which count even if no program publishes: bare; While_Timeout '
         'over 10 s: slow; topics of Serve rows without Period, so a PLC that stops is not '
         'noticed: silent')
+    shared = [make_mapping(f'N11:{number}', 'Write', tag=f'w{number}', fallback=fallback)
+              for number in range(4)]
+    note, = report_of(*guarded, *shared, mode='Peer').notes()
+    assert note == (
+        'rows with Fallback that take messages of any number of publishers: w0, w1, w2 and 1 '
+        'more; Single_Publisher Yes refuses all messages while more than one publisher is alive; '
+        f'{killed}')
 
 
 def test_what_a_reset_of_the_slaves_would_destroy_is_noted_where_rows_wait_for_messages() -> None:

@@ -321,7 +321,7 @@ def test_number_to_which_a_gateway_replies_is_told_also_where_all_works(
         make_bench: Benches) -> None:
     bench = make_bench('speed,Read,N7:0,1,SLC,1000', 'load,Read,N7:0,2,SLC,1000', mode='Peer')
     watches = watches_of(bench.diagnostics.line, PORT, bench.seen, [], lambda now: [],
-                         lambda now: [], lambda now: '')
+                         lambda now: [], lambda now: {}, lambda now: '')
     command = Packet(1, 5, 0x0F, 0, 1, b'')
     stations = bench.driver.stations
     assert not stations.answers(command.reply()._replace(dst=8), command, None)
@@ -379,7 +379,8 @@ def test_fault_is_logged_when_it_begins_and_again_after_it_was_over(bench: Bench
     guests: Any = [SimpleNamespace(guest=Guest(name), fault='') for name in ('pty:b', 'pty:a')]
     watches = watches_of(
         bench.diagnostics.line, PORT, bench.seen, guests, lambda now: ['a'] * (now == NOW + 17),
-        lambda now: ['b'] * (now == NOW + 17), lambda now: faults[int(now - NOW)])
+        lambda now: ['b'] * (now == NOW + 17),
+        lambda now: {'c': '/e, /f'} if now == NOW + 17 else {}, lambda now: faults[int(now - NOW)])
 
     def look(now: float) -> list[str]:
         return [news.text for watch in watches for news in watch.look(NOW + now)]
@@ -404,7 +405,8 @@ def test_fault_is_logged_when_it_begins_and_again_after_it_was_over(bench: Bench
         bench.driver.refused.add(sent, command.reply(sts=0x10), NOW)
     stations.lost(2, NOW)  # which the events tell
     assert [text[:24] for text in look(17.0)] == [
-        'a changed since read; ca', '~/write/b has more than ', 'guest pty:a: in use',
+        'a changed since read; ca', '~/write/b has more than ', '~/write/c has more than ',
+        'guest pty:a: in use',
         'refused a command of sta', 'refused a command of sta', 'station 1 is an SLC 5/03']
     assert look(18.0) == bench.seen.changed_files == bench.seen.crowded == [*bench.seen.dds_fault]
     bench.seen.is_waiting = lambda: True  # it offers no ~/reload

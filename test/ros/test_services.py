@@ -316,7 +316,8 @@ class StandIn:
     def read_now(self, row: Mapping, take: Callable[[ReadAnswer], None]) -> None:
         self.takes.append(take)
 
-    def take(self, topic: str, *message: object) -> None:
+    def take(self, topic: str, *message: object, is_call: bool) -> None:
+        assert is_call
         self.messages += message
 
 

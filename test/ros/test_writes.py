@@ -15,18 +15,23 @@
 """What becomes of messages to write topics: dropped on the way, waiting, given to a driver."""
 
 from collections.abc import Callable, Sequence
+from functools import partial
+import math
 import time
 from types import SimpleNamespace
 from typing import Any, cast
 
 from abdf1_ros.driver.driver import Driver
+from abdf1_ros.driver.interlocks.fallback import Crowd
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ros.callbacks import AnsweringNode
-from abdf1_ros.ros.topics.writes import count_publishers, LossCounter, WriteTopics
+from abdf1_ros.ros.topics.publishers import count_publishers, UNKNOWN
+from abdf1_ros.ros.topics.writes import LossCounter, WriteTopics
 from abdf1_ros.settings.heartbeats import Fallback
 from abdf1_ros.settings.mapping import Mapping
 import pytest
 from rclpy.node import Node
+from rclpy.qos import QoSProfile
 from std_msgs.msg import Float32MultiArray, Int16MultiArray
 from support.mappings import make_mapping
 from support.ros import Observer
@@ -62,11 +67,18 @@ class Taker:
         self.callbacks: dict[str, Callable[[Any, Any], None]] = {}
         self.kinds: dict[str, type] = {}
         self.wakes: list[int] = []
+        self.events: Any = None  # of a topic with Single_Publisher
+        self.interlocks, self.panel = self, 'panel'
 
-    def create_subscription(self, kind: Any, name: str, callback: Any, qos: Any) -> str:
+    def create_subscription(self, kind: Any, name: str, callback: Any, qos: Any,
+                            event_callbacks: Any = None) -> str:
         topic = name.rpartition('/')[2]
         self.callbacks[topic], self.kinds[topic] = callback, kind
+        self.events = event_callbacks or self.events
         return topic
+
+    def crowd(self, topic: str, crowd: Crowd) -> None:
+        self.said.append(f'{topic}: {crowd.why}' + ' until now' * math.isfinite(crowd.until))
 
     def destroy_subscription(self, subscription: str) -> None:
         self.said.append(f'-{subscription}')
@@ -105,7 +117,8 @@ class Taker:
                 'received_timestamp': now - int(waited * 1e9)})
 
     def get_publishers_info_by_topic(self, name: str) -> list[Any]:
-        return [SimpleNamespace(node_namespace='/', node_name=f'panel_{name[-1]}')]
+        return [SimpleNamespace(node_namespace='/', node_name=f'{self.panel}_{name[-1]}',
+                                qos_profile=QoSProfile(depth=1))]
 
     def lost(self, topic: str, count: int) -> None:
         self.said.append(f'{topic}: {count} lost')
@@ -237,6 +250,29 @@ def test_row_of_another_message_type_has_another_subscription(
     node.kinds.clear()
     node.open(topics)
     assert node.kinds == {'a': Float32MultiArray}
+
+
+def test_rule_28_driver_that_has_the_line_is_told_who_publishes(
+        node: Taker, topics: WriteTopics) -> None:
+    topics.begin()
+    node.tasks[0]()
+    single = partial(make_mapping, 'N7:0', 'Write', tag='a', single_publisher=True)
+    node.mappings[0] = single()
+    topics.give_to(node.open(topics))
+    node.panel = UNKNOWN
+    node.events.matched(SimpleNamespace(total_count=2, current_count=2))
+    node.panel = 'panel'
+    node.publish('a', 1)
+    new = Taker('a', 'b')
+    new.mappings[0] = single()
+    opened = new.open(topics)  # it has the subscription already
+    node.publish('a', 2)
+    topics.give_to(opened)
+    topics.withdraw()
+    crowd = 'a: more than one publisher: /panel_a'
+    assert node.said == ['-a', crowd.replace('panel', UNKNOWN), crowd, 'a 1', 'a 2', '-b', '-a']
+    assert new.said == [crowd, f'{crowd} until now']
+    assert len(node.wakes) == 4 and len(new.wakes) == 2
 
 
 def test_remapped_topic_has_the_publishers_of_its_new_name() -> None:

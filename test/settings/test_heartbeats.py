@@ -174,6 +174,25 @@ def test_rule_12_write_and_serve_rows_take_a_fallback(
         cells['Fallback'], str(fallback.after)]
 
 
+@for_all(('command', 'cell', 'is_single'), [
+    ('Write', 'yes', True), ('Serve', 'Yes', True), ('Write', 'No', False), ('Write', '', False)])
+def test_rule_28_rows_with_a_fallback_may_have_a_single_publisher(
+        command: str, cell: str, is_single: bool) -> None:
+    mapping = one(**WRITE | {'Command': command, 'Fallback': '0', 'Fallback_After': '500',
+                             'Single_Publisher': cell})
+    assert mapping.single_publisher is is_single
+    assert cell_of(mapping, 'Single_Publisher') == ('Yes' if is_single else '')
+
+
+@for_all(('cells', 'text'), [
+    ({}, 'Single_Publisher is for rows with Fallback: without one the last value would stand'),
+    ({'Command': 'ReadWrite'},
+     'a ReadWrite row has no Single_Publisher: it is for Write and Serve rows'),
+    ({'Single_Publisher': '1'}, 'Single_Publisher = "1" should be one of Yes, No')])
+def test_rule_28_what_a_single_publisher_is_not_for(cells: dict[str, str], text: str) -> None:
+    assert text in fault(**WRITE | {'Single_Publisher': 'Yes'} | cells)
+
+
 @for_all(('cells', 'text'), [
     ({'Fallback': '0'}, 'Fallback_After is missing: ms from 200 to 60000'),
     ({'Fallback_After': '500'}, 'Fallback is missing: the values to write'),

@@ -13,13 +13,14 @@
 # limitations under the License.
 
 """
-Fallback values, which are written when messages no longer come (rules 7 to 12 and 17).
+Fallback values, which are written when messages no longer come (rules 7 to 12, 17 and 28).
 
 The rules have the numbers of docs/heartbeats.md.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from enum import Enum
 import math
 
@@ -40,6 +41,7 @@ class FallbackCause(Enum):
     RETURN = 'return'
     RUN = 'run'
     END = 'end'
+    PUBLISHERS = 'publishers'
 
 
 class FallbackState(Enum):
@@ -49,6 +51,19 @@ class FallbackState(Enum):
     DUE = 'the fallback value is due'
     STANDS = 'the fallback value stands'
     OVERWRITTEN = 'a guest has written over the fallback value'
+
+
+@dataclass(frozen=True, slots=True)
+class Crowd:
+    """
+    A topic has, or had, more than one publisher, and one of its rows allows one only (rule 28).
+
+    Messages that were published up to ``until`` (clock value in s) are refused. It is infinite
+    while more than one publisher is alive. ``why`` is the reason for the results, with names.
+    """
+
+    why: str
+    until: float = math.inf
 
 
 class FallbackRow:
@@ -66,6 +81,7 @@ class FallbackRow:
     - ``refusal``: why the last write of the fallback was not confirmed.
     - ``words``: the writes that may change these words.
     - ``raw``: the fallback as the PLC gets it.
+    - ``refused_until``: ``Crowd.until`` of the last crowd for which the fallback became due.
     """
 
     def __init__(self, words: OwnWords) -> None:
@@ -87,6 +103,7 @@ class FallbackRow:
         # fallback it counts from the first message with an unknown outcome.
         self._counts_from = -math.inf
         self.has_failed = False
+        self.refused_until = -math.inf
         self._values = mapping.fallback.values
         self.raw = raw_values(mapping, self._values)
         self._due_since = 0.0

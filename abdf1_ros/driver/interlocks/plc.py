@@ -28,7 +28,7 @@ from operator import attrgetter
 
 from abdf1_ros.df1.probes import OTHERS_SHARE
 from abdf1_ros.df1.stations import ActiveStationList
-from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackRow
+from abdf1_ros.driver.interlocks.fallback import Crowd, FallbackCause, FallbackRow
 from abdf1_ros.driver.interlocks.heartbeat import HeartbeatRow
 from abdf1_ros.driver.record import Claim, WriteRecord
 from abdf1_ros.driver.write import key_of, Outcome
@@ -64,6 +64,8 @@ class Conditions:
 
     - ``executor``: when the ROS executor ran last.
     - ``messages``: publication time of the last accepted message of each topic.
+    - ``crowds``: the last crowd of each topic of rows with Single_Publisher. The thread of the
+      callbacks sets it before it hands on a message that came since.
     - ``is_ending``: the bridge ends; ``ended``: when the end began, infinite before it.
     - ``gave_way``: when heartbeats last gave way to a fallback that stands.
     - ``is_beats_turn``: they have just given way to such a fallback, or to a read.
@@ -71,6 +73,7 @@ class Conditions:
 
     executor: float = -math.inf
     messages: dict[str, float] = field(default_factory=dict)
+    crowds: dict[str, Crowd] = field(default_factory=dict)
     is_ending: bool = False
     ended: float = math.inf
     gave_way: float = -math.inf

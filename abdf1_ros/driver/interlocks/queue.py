@@ -28,7 +28,12 @@ import math
 from operator import attrgetter
 from random import Random
 
-from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackRow, FallbackState
+from abdf1_ros.driver.interlocks.fallback import (
+    Crowd,
+    FallbackCause,
+    FallbackRow,
+    FallbackState,
+)
 from abdf1_ros.driver.interlocks.heartbeat import BeatState, HeartbeatRow, LARGEST
 from abdf1_ros.driver.interlocks.plc import Conditions, OwnRow, Plc, TurnRank
 from abdf1_ros.driver.job_tasks import Job
@@ -61,7 +66,8 @@ class Interlocks(WriteListener):
       each other if both counted from 1.
     - ``ours``: the rows of our own table; ``expire`` has work when ``ours`` is due.
 
-    Only ``executor_ran``, ``wind_down`` and ``resume`` may be called from another thread.
+    Only ``executor_ran``, ``crowd``, ``wind_down`` and ``resume`` may be called from another
+    thread.
     """
 
     def __init__(self, mappings: Rows, writes: WriteQueue, writing: WritesUnderWay,
@@ -82,6 +88,7 @@ class Interlocks(WriteListener):
         self._plc_of = {row: self.plcs[number] for row, number in stations_of.items()}
         self.ours = self.plcs.pop(OUR_TABLE)
         self._by_mapping = {row.mapping: row for row in self.fallbacks}
+        self._single = [row for row in self.fallbacks if row.mapping.single_publisher]
         self._row_of = {row.mapping: row for row in rows}
         self._writes = writes
         self._writing = writing
@@ -103,6 +110,15 @@ class Interlocks(WriteListener):
     def executor_ran(self, now: float) -> None:
         """Record that the executor runs: a hung process must not look alive (rule 3 c)."""
         self.conditions.executor = now
+
+    def crowd(self, topic: str, crowd: Crowd) -> None:
+        """
+        Record that a topic has, or had, more than one publisher (rule 28).
+
+        Then the caller has to wake the link. Only the last crowd of a topic is kept: publishers
+        that come and go faster than the link looks fill no memory.
+        """
+        self.conditions.crowds[topic] = crowd
 
     def wind_down(self) -> None:
         """
@@ -247,6 +263,26 @@ class Interlocks(WriteListener):
         """Tell whether the end has begun, or a fallback was sent after a message (rules 5, 9)."""
         row = self._by_mapping.get(write.mapping)
         return row is not None and (self.conditions.are_all_due or write.requested <= row.sent)
+
+    def why_refused(self, write: Write) -> str:
+        """Return why the publishers of a topic forbid a message, empty if they do not (28)."""
+        crowd = self.conditions.crowds.get(write.mapping.topic) \
+            if write.mapping.single_publisher else None
+        return crowd.why if crowd and write.requested <= crowd.until else ''
+
+    def new_crowds(self, now: float) -> Iterator[tuple[Mapping, str]]:
+        """Make the fallbacks of new crowds due; yield their rows, each with the reason (28)."""
+        if not self._has_begun or self.is_ending:
+            return
+        for row in self._single:
+            crowd = self.conditions.crowds.get(row.mapping.topic)
+            if crowd is None or crowd.until == row.refused_until:
+                continue
+            is_new, row.refused_until = crowd.until > row.refused_until, crowd.until
+            if is_new:
+                row.make_due(FallbackCause.PUBLISHERS, now)
+                self._plc_of[row].plan()
+                yield row.mapping, crowd.why
 
     def is_put_off(self, write: Write) -> bool:
         """

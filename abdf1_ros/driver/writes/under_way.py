@@ -70,6 +70,11 @@ class WriteJob(Job):
         self._writing.ended(self)
 
 
+def is_message_of(row: Mapping, job: Job) -> bool:
+    """Tell whether a job writes a message of a row."""
+    return isinstance(job, WriteJob) and job.write.mapping is row and not job.is_own
+
+
 class WritesUnderWay:
     """Carry out writes, and report their ends to ``record``, to stations and to reads."""
 

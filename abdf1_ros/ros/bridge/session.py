@@ -144,7 +144,7 @@ class BridgeSession:
             OtherPublisherWatch(surroundings.graph, our_name, names, seen),
             StrayWatch(surroundings.graph, our_name, names, seen),
             *watches_of(self.diagnostics.line, self.port, seen, self.guests.lines,
-                        configuration.files.changed, self.owners.look,
+                        configuration.files.changed, self.owners.look, self.owners.refusing,
                         surroundings.graph.dds.look)]
         self.link_counters = LinkCounterService(
             self.driver, self._wake_link, surroundings.wake_executor)

@@ -59,7 +59,7 @@ class InterlockStatus:
         self._since: dict[str, float] = {}
 
     def judge(self, now: float) -> Judgement:
-        """Return WARN if ROS is not in control, ERROR if another program writes a heartbeat."""
+        """Return WARN if ROS is not in control, ERROR if a heartbeat or topic has two owners."""
         at_rest = [beat.mapping.tag for beat in self._beats if self._why_not(beat, now)]
         unconfirmed = [beat.mapping.tag for beat in self._beats if beat.mapping.tag not in at_rest
                        and self._control(beat, now)[0] <= _InControl.UNKNOWN]
@@ -71,10 +71,12 @@ class InterlockStatus:
             (unconfirmed, 'the PLC does not confirm that ROS is in control'),
             (due, 'fallback value is due'),
             (guests, FallbackState.OVERWRITTEN.value),
-            (self._watched.crowded, 'more than one publisher')) if tags]
+            (self._watched.crowded, 'more than one publisher'),
+            (self._watched.refused, 'messages are refused: more than one publisher')) if tags]
         counting = len(self._beats) - len(at_rest)
         text = f'{counting} of {len(self._beats)} heartbeats count'
-        level = OK if not notes else ERROR if any(map(_is_taken, self._beats)) else WARN
+        is_shared = self._watched.refused or any(map(_is_taken, self._beats))
+        level = OK if not notes else ERROR if is_shared else WARN
         return level, '; '.join([text, *notes])
 
     def _why_not(self, beat: HeartbeatRow, now: float) -> str:
@@ -130,7 +132,7 @@ class InterlockStatus:
             **{f'station {number} last fallback': with_age(moment, now)
                for number, moment in [*self._watched.last_fallbacks.items()]},
             **{beat.mapping.tag: self._beat(beat, now) for beat in self._beats},
-            **{row.mapping.tag: _fallback(row) for row in self._fallbacks},
+            **{row.mapping.tag: self._fallback(row) for row in self._fallbacks},
             **{f'bound of {bound.mapping.tag}': _bound(bound) for bound in self._bounds}}
 
     def _beat(self, beat: HeartbeatRow, now: float) -> str:
@@ -139,16 +141,18 @@ class InterlockStatus:
         return f'heartbeat {beat.value}{age}; ' \
             + (f'does not count: {reason}' if reason else 'counts')
 
+    def _fallback(self, row: FallbackRow) -> str:
+        cause = row.cause  # once: the link's thread may change it meanwhile
+        names = row.mapping.single_publisher and self._watched.refused.get(row.mapping.topic)
+        why = f'; more than one publisher: {names}' if names else ''
+        if cause is None:
+            return row.state.value + why
+        refusal = f': {row.refusal}' if row.refusal else ''
+        return f'{row.state.value} ({cause.value}){refusal}{why}'
+
 
 def _is_taken(beat: HeartbeatRow) -> bool:
     return beat.state is BeatState.CONFLICT
-
-
-def _fallback(row: FallbackRow) -> str:
-    cause = row.cause  # once: the link's thread may change it meanwhile
-    if cause is None:
-        return row.state.value
-    return f'{row.state.value} ({cause.value})' + (f': {row.refusal}' if row.refusal else '')
 
 
 def _bound(bound: Bound) -> str:

@@ -68,6 +68,8 @@ class Seen:
     """The other nodes that publish a topic of ours, by topic."""
     strays: Mapping[str, str] = field(default_factory=dict)
     """Who publishes beside our topics, and why nothing is written, by topic."""
+    refused: Mapping[str, str] = field(default_factory=dict)
+    """Topics with Single_Publisher and more than one publisher, with their names."""
     conflicts: dict[str, str] = field(default_factory=dict)
     """
     Text on the value that another program has written over a heartbeat, by tag of the heartbeat.

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Protocol
 
 from abdf1_ros.messages import Message
@@ -82,6 +82,7 @@ class DeafStations:
 def watches_of(line: LineView, port: str, seen: Seen, guests: Sequence[GuestLine],
                changed_files: Callable[[float], Sequence[str]],
                crowded_topics: Callable[[float], Sequence[str]],
+               refused_topics: Callable[[float], Mapping[str, str]],
                dds_fault: Callable[[float], str]) -> list[Watch]:
     """Return the watches of a session; they put findings for the statuses into ``seen``."""
     def changed(now: float) -> list[str]:
@@ -94,6 +95,12 @@ def watches_of(line: LineView, port: str, seen: Seen, guests: Sequence[GuestLine
                 'while any of them goes on (a forgotten "ros2 topic pub -r"?)'
                 for topic in seen.crowded]
 
+    def refused(now: float) -> list[str]:
+        seen.refused = refused_topics(now)
+        return [f'~/write/{topic} has more than one publisher: {names}. All messages of its rows '
+                'with Single_Publisher are refused, and their fallback values are written, until '
+                'only one is left' for topic, names in seen.refused.items()]
+
     def unheard(now: float) -> list[str]:
         seen.dds_fault = dds_fault(now)
         return [seen.dds_fault] if seen.dds_fault else []
@@ -105,6 +112,7 @@ def watches_of(line: LineView, port: str, seen: Seen, guests: Sequence[GuestLine
     return [
         NewFaults(WARN, 'the files', changed),
         NewFaults(WARN, 'publishers', crowded),
+        NewFaults(ERROR, 'publishers', refused),
         NewFaults(WARN, 'DDS', unheard),
         NewFaults(ERROR, 'guests', lambda now: [
             f'guest {guest.guest.name}: {guest.fault}' for guest in guests if guest.fault]),

@@ -20,9 +20,12 @@ docs/heartbeats.md has the numbered rules.
 
 from __future__ import annotations
 
+import math
+
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.ports.clock import line_time
-from abdf1_ros.ros.topics.writes import count_publishers
+from abdf1_ros.ros.topics.publishers import count_publishers, publisher_names, UNKNOWN
+from abdf1_ros.text import first
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.timer import Timer
@@ -32,6 +35,9 @@ _LIFE_SIGN_PERIOD = 0.1
 
 # Seconds between two counts of the publishers to topics with a Fallback.
 _COUNT_PERIOD = 2.0
+
+# Seconds in which the name of a new publisher mostly becomes known.
+_NAMES_COME = 1.0
 
 
 class InterlockWatch:
@@ -47,6 +53,10 @@ class InterlockWatch:
         self._interlocks = driver.interlocks
         self._next_look = 0.0
         self._crowded: tuple[str, ...] = ()
+        self._refusing: dict[str, float] = {}  # topics, and since when (clock value in s)
+        rows = [row.mapping for row in self._interlocks.fallbacks]
+        self._single = {row.topic for row in rows if row.single_publisher}
+        self._counted = {row.topic: None for row in rows if row.topic not in self._single}
         self._timer: Timer | None = None
         self._report_executor()
         if self._interlocks.heartbeats:
@@ -69,14 +79,23 @@ class InterlockWatch:
         """
         Return the topics of Fallback rows with two or more publishers and callers (rule 17).
 
-        Between two counts it returns the last result.
+        Between two counts it returns the last result. Topics with Single_Publisher are left out.
         """
         if now >= self._next_look:
             self._next_look = now + _COUNT_PERIOD
-            topics = dict.fromkeys(row.mapping.topic for row in self._interlocks.fallbacks)
             self._crowded = tuple(
-                topic for topic in topics if count_owners(self._node, topic) > 1)
+                topic for topic in self._counted if count_owners(self._node, topic) > 1)
         return self._crowded
+
+    def refusing(self, now: float) -> dict[str, str]:
+        """Return the topics whose publishers are refused, with their names (rule 28)."""
+        crowds = self._interlocks.conditions.crowds
+        topics = [topic for topic in self._single
+                  if topic in crowds and crowds[topic].until == math.inf]
+        self._refusing = {topic: self._refusing.get(topic, now) for topic in topics}
+        names = {topic: publisher_names(self._node, topic) for topic in topics}
+        return {topic: first(found) for topic, found in names.items()
+                if UNKNOWN not in ' '.join(found) or now >= self._refusing[topic] + _NAMES_COME}
 
 
 def count_owners(node: Node, topic: str) -> int:

@@ -24,6 +24,7 @@ from abdf1_ros.driver.writes.queue import MAX_WAITING_WRITES
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.values import Values, ValueType
 from abdf1_ros.ros.untyped import RosMessage
+from abdf1_ros.settings.heartbeats import LONGEST_LEASE
 from abdf1_ros.settings.mapping import Mapping
 from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
@@ -111,6 +112,14 @@ def write_qos() -> QoSProfile:
     return QoSProfile(
         depth=WRITE_DEPTH, reliability=ReliabilityPolicy.RELIABLE,
         durability=DurabilityPolicy.VOLATILE)
+
+
+def lease_qos() -> QoSProfile:
+    """Return the QoS of a subscription that watches leases of publishers, not their messages."""
+    return QoSProfile(
+        depth=1, reliability=ReliabilityPolicy.BEST_EFFORT,
+        durability=DurabilityPolicy.VOLATILE,
+        liveliness_lease_duration=Duration(seconds=LONGEST_LEASE))
 
 
 def results_qos() -> QoSProfile:

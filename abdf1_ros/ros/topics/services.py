@@ -175,7 +175,7 @@ class RowServices:
                 layout=MultiArrayLayout(dim=[MultiArrayDimension(label=label)]),
                 data=[int(request.data)]), {
                     'source_timestamp': published, 'received_timestamp': received,
-                    'publication_sequence_number': None})
+                    'publication_sequence_number': None}, is_call=True)
             await call.done
         results = [result for result in call.results if isinstance(result, WriteResult)]
         response.success = len(results) == len(rows) and all(

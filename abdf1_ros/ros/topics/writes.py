@@ -30,16 +30,22 @@ import time
 from typing import Protocol
 
 from abdf1_ros.driver.driver import Driver, TOO_MANY
+from abdf1_ros.driver.interlocks.fallback import Crowd
 from abdf1_ros.driver.writes.ages import Ages, HostClock, most_ahead, RecentMax, REMEMBERED
 from abdf1_ros.driver.writes.queue import MAX_WAITING_WRITES
 from abdf1_ros.errors import FormatError
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ros.callbacks import AnsweringNode
 from abdf1_ros.ros.topics.messages import MESSAGES, values_of, write_qos
+from abdf1_ros.ros.topics.publishers import (
+    count_publishers,
+    full_name,
+    publisher_names,
+    PublisherWatch,
+)
 from abdf1_ros.ros.untyped import MessageInfo, RosMessage
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.text import printable
-from rclpy.node import Node
 from rclpy.subscription import Subscription
 from std_msgs.msg import String
 
@@ -133,6 +139,11 @@ class WriteTopic:
         self._wake = wake
         self._next_ahead = -math.inf
 
+    def crowd(self, crowd: Crowd) -> None:
+        """Tell the driver that the topic has, or had, more than one publisher (rule 28)."""
+        self._driver.interlocks.crowd(self._topic, crowd)
+        self._wake()
+
     def arrived(self, info: MessageInfo) -> None:
         """Report the messages that were lost before this message."""
         if lost := self._losses.lost_before(info['publication_sequence_number']):
@@ -171,9 +182,9 @@ class WriteTopics:
 
     def __init__(self, node: AnsweringNode) -> None:
         self._node = node
-        self._waiting: list[tuple[str, RosMessage, MessageInfo]] = []
+        self._waiting: list[tuple[str, RosMessage, MessageInfo, bool]] = []
         self._has_begun = self.is_open = False
-        self._subscriptions: dict[str, tuple[type, Subscription]] = {}
+        self._subscriptions: dict[str, tuple[type, Subscription | PublisherWatch]] = {}
         self._topics: dict[str, WriteTopic] = {}
         # Stamp and number of the latest messages of each topic; a busy topic drives out no other.
         self.latest: defaultdict[str, dict[tuple[int, int], None]] = defaultdict(dict)
@@ -190,13 +201,13 @@ class WriteTopics:
     def _take_waiting(self) -> None:
         waiting, self._waiting = self._waiting, []
         self.is_open = True
-        for topic, message, info in waiting:
+        for topic, message, info, is_call in waiting:
             self.taken += 1
             try:
                 if topic in self._topics:  # a reload may have removed its rows
-                    self._topics[topic].take(message, info)
+                    self._topics[topic].take(message, info, self._why_refused(topic, is_call))
             except Exception as error:  # go on with the other messages
-                self._node.tell_failure(f'a message on {_name(topic)}', error)
+                self._node.tell_failure(f'a message on {full_name(topic)}', error)
 
     def open(self, driver: Driver, patience: float,  # noqa: A003
              listener: WriteTopicListener, wake: Callable[[], None]) -> dict[str, WriteTopic]:
@@ -207,47 +218,70 @@ class WriteTopics:
             if mapping.writes:
                 wanted[mapping.topic].append(mapping)
         kinds = {topic: MESSAGES[mappings[0].message_type] for topic, mappings in wanted.items()}
+        single = {topic for topic, mappings in wanted.items()
+                  if any(mapping.single_publisher for mapping in mappings)}
         for topic, (kind, subscription) in [*self._subscriptions.items()]:
-            if kinds.get(topic) is not kind:
-                self._node.destroy_subscription(subscription)
-                del self._subscriptions[topic]
+            if kinds.get(topic) is not kind \
+                    or isinstance(subscription, PublisherWatch) is not (topic in single):
+                self._unsubscribe(topic)
         for topic, kind in kinds.items():
             if topic not in self._subscriptions:
-                self._subscriptions[topic] = kind, self._subscription(topic, kind)
+                self._subscriptions[topic] = kind, self._subscribe(
+                    topic, kind, is_single=topic in single)
         return {topic: WriteTopic(
             topic, mappings, driver,
             Ages(patience, self.host_clock, most_ahead(topic, driver.mappings),
                  self._leads[topic]),
-            listener=listener, publishers=partial(self._publishers, topic), wake=wake,
+            listener=listener, publishers=partial(publisher_names, self._node, topic), wake=wake,
             losses=LossCounter(partial(count_publishers, self._node, topic)))
             for topic, mappings in wanted.items()}
 
     def withdraw(self) -> None:
         """Close all subscriptions."""
+        for topic in [*self._subscriptions]:
+            self._unsubscribe(topic)
         self._topics = {}
-        for _, subscription in self._subscriptions.values():
-            self._node.destroy_subscription(subscription)
-        self._subscriptions.clear()
 
     def give_to(self, topics: dict[str, WriteTopic]) -> None:
         """Hand messages to these topics from now on."""
         self._topics = topics
+        for topic in topics:
+            if (watch := self._watch(topic)) and (crowd := watch.living.crowd):
+                self._crowd(topic, crowd)
 
-    def _publishers(self, topic: str) -> list[str]:
-        return [f'{end.node_namespace.rstrip("/")}/{end.node_name}'
-                for end in self._node.get_publishers_info_by_topic(_name(topic))]
+    def take(self, topic: str, message: RosMessage, info: MessageInfo, *,
+             is_call: bool = False) -> None:
+        """
+        Count messages lost before a message; then hand it on, let it wait, or refuse it.
 
-    def take(self, topic: str, message: RosMessage, info: MessageInfo) -> None:
-        """Count messages lost before a message; then hand it on, let it wait, or refuse it."""
+        ``is_call``: the message is a call of ~/set.
+        """
         if self._came_before(topic, info):
             return
         self._topics[topic].arrived(info)
-        reject_reason = '' if self.is_open else TOO_MANY
-        if reject_reason and len(self._waiting) < MAX_WAITING_WRITES:
-            self._waiting.append((topic, message, info))
+        if not self.is_open and len(self._waiting) < MAX_WAITING_WRITES:
+            self._waiting.append((topic, message, info, is_call))
             return
         self.taken += 1
-        self._topics[topic].take(message, info, reject_reason)
+        self._topics[topic].take(message, info, self._why_refused(topic, is_call))
+
+    def _why_refused(self, topic: str, is_call: bool) -> str:
+        """Return why a message is refused without a look at it, empty if it is not."""
+        if not self.is_open:
+            return TOO_MANY
+        if (watch := self._watch(topic)) is None:
+            return ''
+        watch.living.ask_names_again()
+        return watch.living.why_no_call if is_call else ''
+
+    def _watch(self, topic: str) -> PublisherWatch | None:
+        """Return the watch of a topic with Single_Publisher, None for other topics."""
+        _, subscription = self._subscriptions.get(topic, (None, None))
+        return subscription if isinstance(subscription, PublisherWatch) else None
+
+    def _crowd(self, topic: str, crowd: Crowd) -> None:
+        if topic in self._topics:
+            self._topics[topic].crowd(crowd)
 
     def _came_before(self, topic: str, info: MessageInfo) -> bool:
         """
@@ -267,15 +301,16 @@ class WriteTopics:
             del latest[next(iter(latest))]
         return came_before
 
-    def _subscription(self, topic: str, kind: type) -> Subscription:
+    def _subscribe(self, topic: str, kind: type, *,
+                   is_single: bool) -> Subscription | PublisherWatch:
         callback: Callable[..., None] = partial(self.take, topic)
-        return self._node.create_subscription(kind, _name(topic), callback, write_qos())
+        if is_single:
+            return PublisherWatch(self._node, kind, topic, callback, partial(self._crowd, topic))
+        return self._node.create_subscription(kind, full_name(topic), callback, write_qos())
 
-
-def count_publishers(node: Node, topic: str) -> int:
-    """Return how many publishers a write topic has; its name is remapped here, not by rclpy."""
-    return node.count_publishers(node.resolve_topic_name(_name(topic)))
-
-
-def _name(topic: str) -> str:
-    return f'~/write/{topic}'
+    def _unsubscribe(self, topic: str) -> None:
+        _, subscription = self._subscriptions.pop(topic)
+        if isinstance(subscription, PublisherWatch):
+            subscription.end()
+        else:
+            self._node.destroy_subscription(subscription)
