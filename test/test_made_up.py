@@ -44,6 +44,7 @@ assert [point.update(word, now) for now, word in enumerate(words)] == [
 LOG = """
 from types import SimpleNamespace
 from abdf1_ros.ros.diagnostics.events import LineEvents
+from abdf1_ros.ros.diagnostics.log import NodeLog
 from abdf1_ros.ros.diagnostics.status import Seen
 from abdf1_ros.ros.topics.reads import ReadTopics
 from support.driver_bench import DriverBench, store
@@ -56,8 +57,8 @@ assert 'a Log row has no Topic: it is for Read' in fault(Command='Log', Topic='a
 lines, published = [], []
 logger = SimpleNamespace(info=lines.append, warning=lines.append, error=lines.append,
                          is_enabled_for=lambda severity: False)
-events = LineEvents(logger, 'port', {1}, scans=True, seen=Seen(), results=None,
-                    read=lambda row, values: published.append(row.tag),
+events = LineEvents(NodeLog(logger, lambda: 0.0), 'port', {1}, scans=True, seen=Seen(),
+                    results=None, read=lambda row, values: published.append(row.tag),
                     table_changed=lambda: None)
 bench = DriverBench(rows, listener=events)
 plc = bench.plc(1, 'PLC5', ('N7:0', 2))

@@ -53,6 +53,7 @@ from abdf1_ros.ros.diagnostics.events import LineEvents
 from abdf1_ros.ros.diagnostics.line import LineView, takes_in_silence
 from abdf1_ros.ros.diagnostics.link import LinkStatus
 from abdf1_ros.ros.diagnostics.load import FullLine
+from abdf1_ros.ros.diagnostics.log import NodeLog
 from abdf1_ros.ros.diagnostics.status import message_of, Seen
 from abdf1_ros.ros.diagnostics.statuses import Diagnostics
 from abdf1_ros.ros.diagnostics.watches import watches_of
@@ -89,8 +90,8 @@ class Bench:
         self.results: list[DiagnosticStatus] = []
         self.tables = 0  # how often the Active Node Table has changed
         self.events = LineEvents(
-            get_logger('line_a'), PORT, mappings.asked, scans=mode != 'Peer',
-            seen=self.seen, read=lambda mapping, values: None, results=self,
+            NodeLog(get_logger('line_a'), lambda: self.now), PORT, mappings.asked,
+            scans=mode != 'Peer', seen=self.seen, read=lambda mapping, values: None, results=self,
             table_changed=self._count, clock=lambda: self.now)
         self.driver = Driver(Network(mode=mode), mappings, DriverSettings(), self.events)
         self.link = LinkThread(self.driver.machine, lambda: pytest.fail('no port here'))

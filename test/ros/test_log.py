@@ -18,7 +18,16 @@ from collections.abc import Callable, Iterator
 import re
 
 from abdf1_ros.messages import Event, Message, Severity
-from abdf1_ros.ros.diagnostics.log import EventLog, LimitedLog, MOST_ENTRIES, UnreadableRows
+from abdf1_ros.ros.diagnostics.log import (
+    ERROR,
+    EventLog,
+    INFO,
+    LimitedLog,
+    MOST_ENTRIES,
+    NodeLog,
+    UnreadableRows,
+    WARN,
+)
 from abdf1_ros.settings.mapping import Mapping
 import pytest
 from rclpy.logging import get_logger, LoggingSeverity
@@ -189,6 +198,23 @@ def test_only_a_few_lines_a_minute_are_about_one_thing(
     assert [text for _, text in logged()] == [
         r'first again (5 more about one\n were not logged)',
         r'last (1 more about one\n were not logged)']
+
+
+def test_same_files_read_again_are_one_line_and_few_of_them(clock: Clock, logged: Logged) -> None:
+    log = NodeLog(get_logger('log_test'), clock)
+    news = [(INFO, 'net.csv and map.csv'), (WARN, 'a\nb'), (ERROR, 'c')]
+    for _ in range(1000):
+        log.tell_files(news)
+        clock.now += 0.01
+    assert logged() == [
+        ('INFO', 'net.csv and map.csv'), ('WARN', r'a\nb'), ('ERROR', 'c'),
+        *MOST_ENTRIES * [('INFO', 'the files were read again: net.csv and map.csv '
+                          '(and 2 other lines)')]]
+    log.tell_files(news[:1])  # they have changed
+    assert logged() == [('INFO', 'net.csv and map.csv')]
+    for number in range(100):
+        log.tell_files([(INFO, f'map{number}.csv')])
+    assert len(logged()) == MOST_ENTRIES - 2
 
 
 def test_rows_of_a_file_that_fail_for_one_reason_are_one_line(

@@ -14,6 +14,7 @@
 
 """A running bridge whose files are read again, and whose port is given away."""
 
+from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
@@ -31,6 +32,7 @@ from abdf1_ros.ros.bridge.guests import GuestPlaces
 from abdf1_ros.ros.bridge.reload import changes, refuse_harm, rows_left_behind
 from abdf1_ros.ros.bridge.session import BridgeSession
 from abdf1_ros.ros.diagnostics.line import LineView
+from abdf1_ros.ros.diagnostics.log import MOST_ENTRIES
 from abdf1_ros.ros.parameters.declared import Configuration, Parameters
 from abdf1_ros.ros.parameters.file_watch import FileWatch
 from abdf1_ros.ros.parameters.shown import ShownFiles
@@ -116,6 +118,23 @@ def test_rows_come_and_go_and_others_are_not_disturbed(bench: Bench, capfd: Outp
     bench.write_map(LEVEL)
     assert bench.reload()[0]
     bench.ros.until(lambda: not node.count_publishers('/abdf1/read/speed'), 'the end of a topic')
+
+
+def test_service_in_a_loop_does_not_fill_the_log(bench: Bench, capfd: Output) -> None:
+    """The log of the node is limited over all reloads, also of its line and of a faulty file."""
+    bench.ros.listen(Int16MultiArray, '/abdf1/read/speed').first()
+    capfd.readouterr()
+    for _ in range(15):
+        assert bench.reload()[0]
+        assert bench.polling(False)[0] and bench.polling(True)[0]
+    bench.write_map('speed,Read,N7:0,1,XXX')
+    for _ in range(15):
+        assert not bench.reload()[0]
+    told = [line.partition(': ')[2] for line in capfd.readouterr().err.splitlines()]
+    subjects = Counter(line.replace(str(bench.plcs.port), 'PORT').partition(' (')[0]
+                       for line in told)
+    assert max(subjects.values()) <= MOST_ENTRIES, subjects
+    assert len(told) < 60
 
 
 def test_type_that_a_row_had_before_is_not_told_of_another_node(

@@ -40,7 +40,7 @@ from abdf1_ros.ros.bridge.session import BridgeSession, Surroundings, tell_plcs
 from abdf1_ros.ros.bridge.standby import Service, Standby
 from abdf1_ros.ros.callbacks import AnsweringNode, NodeOptions
 from abdf1_ros.ros.diagnostics.graph import Graph
-from abdf1_ros.ros.diagnostics.log import bug_text
+from abdf1_ros.ros.diagnostics.log import bug_text, ERROR
 from abdf1_ros.ros.parameters.arguments import Arguments
 from abdf1_ros.ros.parameters.declared import (
     Configuration,
@@ -193,7 +193,7 @@ class BridgeNode(AnsweringNode):
         """Log an option that the port does not have; rs485 has to be asked for."""
         text = f'{printable(self.session.port)}: {lack.text}'
         if lack.option == 'rs485':
-            self.get_logger().warning(text)
+            self.surroundings.log.notes.warning('rs485', text)
         else:
             self.get_logger().debug(text)
 
@@ -214,8 +214,8 @@ class BridgeNode(AnsweringNode):
                         _port_settings(configuration))
         except ConfigurationError as error:
             self._hold_ports(*before.held)
-            for problem in error.problems:
-                self.get_logger().error(f'{problem} (goes on as before)')
+            self.surroundings.log.tell_files(
+                [(ERROR, f'{problem} (goes on as before)') for problem in error.problems])
             texts = [printable(str(problem)) for problem in error.problems]
             response.message = 'goes on as before: ' + '; '.join(texts[:_MOST_PROBLEMS])
             return response

@@ -21,7 +21,7 @@ results directly, without the executor: rclpy allows any thread to use a publish
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 import math
 import random
@@ -40,6 +40,7 @@ from abdf1_ros.ros.callbacks import AnsweringNode
 from abdf1_ros.ros.diagnostics.alarms import Alarms
 from abdf1_ros.ros.diagnostics.events import LineEvents
 from abdf1_ros.ros.diagnostics.graph import Graph, NameWatch, TypeWatch
+from abdf1_ros.ros.diagnostics.log import ERROR, INFO, NodeLog, WARN
 from abdf1_ros.ros.diagnostics.other_publishers import OtherPublisherWatch, StrayWatch
 from abdf1_ros.ros.diagnostics.stations import LinkCounterService
 from abdf1_ros.ros.diagnostics.status import Seen
@@ -56,10 +57,10 @@ from abdf1_ros.ros.topics.writes import WriteTopic, WriteTopics
 from abdf1_ros.ros.untyped import RosPublisher
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.resets import lost_by_reset
-from abdf1_ros.text import first, printable
+from abdf1_ros.text import first
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
-from rclpy.impl.rcutils_logger import RcutilsLogger
+from rclpy.impl.logging_severity import LoggingSeverity
 from rclpy.publisher import Publisher
 from std_msgs.msg import UInt16MultiArray
 
@@ -91,10 +92,12 @@ class Surroundings:
     is_offered: bool = False
     published: dict[str, ReadTopic] = field(default_factory=dict)
     active_words: Sequence[int] = ()
+    log: NodeLog = field(init=False)
     link: LinkThread = field(init=False)
 
     def __post_init__(self) -> None:
-        """Make the services of rows."""
+        """Make the log and the services of rows."""
+        self.log = NodeLog(self.node.get_logger(), line_time)
         self.services = RowServices(self.node, self.writes, self.wake_executor)
 
     def wake_executor(self) -> None:
@@ -123,7 +126,7 @@ class BridgeSession:
                     diagnostics_period=parameters.diagnostics_period,
                     is_waiting=lambda: self.is_waiting)
         self.events = LineEvents(
-            node.get_logger(), self.port, mappings.asked,
+            surroundings.log, self.port, mappings.asked,
             scans=not network.line_mode.has_one_plc, seen=seen, read=self._reader(),
             results=surroundings.results, table_changed=self._publish_active,
             answer=surroundings.services.take)
@@ -226,11 +229,12 @@ class BridgeSession:
 
     def begin(self) -> None:
         """Log a summary of the files; the driver is on the line, or soon will be."""
-        logger, configuration = self._surroundings.node.get_logger(), self.configuration
-        _tell_files(logger, configuration)
+        configuration = self.configuration
         # Load remarks first, because dozens of setting remarks may follow.
-        _tell_remarks(logger, [*self._plan().load_remarks(), *setting_remarks(
-            configuration.network, configuration.mappings)])
+        remarks = [*self._plan().load_remarks(), *setting_remarks(
+            configuration.network, configuration.mappings)]
+        self._surroundings.log.tell_files(
+            [*_about_files(configuration), *_about_remarks(remarks)])
         self.reads.take_over()
         # with a closed port, port_changed publishes the table after the first attempt to open it
         if self._surroundings.link.state.is_open:
@@ -276,11 +280,13 @@ class BridgeSession:
         has_line = self._surroundings.link.state.is_open
         if self.is_waiting or self.configuration.parameters.standby and not has_line:
             return
-        interlocks, logger = self.driver.interlocks, self._surroundings.node.get_logger()
+        interlocks, notes = self.driver.interlocks, self.events.notes
         if tags := interlocks.unconfirmed(line_time()):
-            logger.error(f'{what} before the PLC has confirmed: {first(tags)}')
+            notes.error(f'rows as it {what}', (
+                f'{what} before the PLC has confirmed: {first(tags)}'))
         if tags := interlocks.not_repeated():
-            logger.warning(f'{what}; confirmed before, but not written again: {first(tags)}')
+            notes.warning(f'rows as it {what}', (
+                f'{what}; confirmed before, but not written again: {first(tags)}'))
 
     def close_line(self) -> None:
         """Let the link end: all is written, or there is no time left."""
@@ -412,38 +418,38 @@ def tell_plcs(sessions: Sequence[BridgeSession], what: str, limit: float, *,
             time.sleep(_GLANCE)
 
 
-def _tell_files(logger: RcutilsLogger, configuration: Configuration) -> None:
-    """Log a summary of both files."""
-    logger.info(str(configuration))
+def _about_files(configuration: Configuration) -> Iterator[tuple[LoggingSeverity, str]]:
+    """Yield a summary of both files."""
+    yield INFO, str(configuration)
     for problem in configuration.map_problems:
-        logger.error(f'{problem} (row left out)')
+        yield ERROR, f'{problem} (row left out)'
     silent = [mapping.tag for mapping in configuration.mappings if mapping.is_alone]
     if silent and configuration.parameters.read_only:
-        logger.warning(
+        yield WARN, (
             f'read_only: no heartbeat and no fallback value is written: {first(silent)}')
     if not configuration.mappings:
-        logger.warning('the map has no usable row: nothing is read or written')
+        yield WARN, 'the map has no usable row: nothing is read or written'
     if configuration.parameters.standby and '://' in configuration.port \
             and not configuration.mappings.stations:
-        logger.warning('standby: no row is of a PLC, so an open connection counts as the line; '
-                       'the device server must refuse a second client')
+        yield WARN, ('standby: no row is of a PLC, so an open connection counts as the line; '
+                     'the device server must refuse a second client')
     if configuration.idle:
-        logger.warning(f'{first(configuration.idle)} without effect: only for Mode Master with '
-                       'Polling Standard')
+        yield WARN, (f'{first(configuration.idle)} without effect: only for Mode Master with '
+                     'Polling Standard')
     lost = lost_by_reset(configuration.network, configuration.mappings)
     if configuration.driver_settings().nak_on_command_timeout and lost:
-        logger.warning('nak_on_command_timeout: each overdue reply makes all slaves drop what '
-                       f'they have queued: {"; ".join(lost)}')
+        yield WARN, ('nak_on_command_timeout: each overdue reply makes all slaves drop what '
+                     f'they have queued: {"; ".join(lost)}')
     if configuration.ignored:
-        logger.warning(
+        yield WARN, (
             'parameters without effect, because only the map file counts: '
             + first(configuration.ignored))
 
 
-def _tell_remarks(logger: RcutilsLogger, remarks: Sequence[Remark]) -> None:
-    """Log the remarks of ``check`` on both files, in the same order."""
+def _about_remarks(remarks: Sequence[Remark]) -> Iterator[tuple[LoggingSeverity, str]]:
+    """Yield the remarks of ``check`` on both files, in the same order."""
     for remark in remarks[:_MOST_REMARKS]:
-        logger.warning(printable(remark.text))
+        yield WARN, remark.text
     if len(remarks) > _MOST_REMARKS:
-        logger.warning(
+        yield WARN, (
             f'and {len(remarks) - _MOST_REMARKS} more remarks; "check" has them all')

@@ -116,14 +116,14 @@ class Standby:
         """Offer everything: the bridge has the line."""
         self.offer()
         self._session().offer()
-        self._surroundings.node.get_logger().info(
-            'has got the line: begins to publish and to accept writes')
+        self._surroundings.log.notes.info(
+            'the line', 'has got the line: begins to publish and to accept writes')
 
     def leave_line(self) -> None:
         """Withdraw all but the services that ``stays`` keeps: another bridge may have the line."""
         if not self._is_half:
-            self._surroundings.node.get_logger().warning(
-                'has lost the line: waits, and offers no topics and services')
+            self._surroundings.log.notes.warning(
+                'the line', 'has lost the line: waits, and offers no topics and services')
         self._surroundings.is_offered = False
         self._session().withdraw()
         for publisher in self._publishers:

@@ -23,12 +23,11 @@ from abdf1_ros.driver.write import Outcome, WriteResult
 from abdf1_ros.messages import Event, Message, Severity
 from abdf1_ros.pccc.values import Values
 from abdf1_ros.ports.clock import line_time
-from abdf1_ros.ros.diagnostics.log import EventLog, LimitedLog, UnreadableRows, where
+from abdf1_ros.ros.diagnostics.log import NodeLog, UnreadableRows, where
 from abdf1_ros.ros.diagnostics.status import ERROR, message_of, OK, Seen, WARN
 from abdf1_ros.ros.diagnostics.writes import is_usual_fallback, WriteLog
 from abdf1_ros.ros.untyped import RosPublisher
 from abdf1_ros.settings.mapping import Mapping
-from rclpy.impl.rcutils_logger import RcutilsLogger
 
 _RESULT_LEVELS = {
     Outcome.WRITTEN: OK, Outcome.STANDS: OK, Outcome.BROADCAST: WARN, Outcome.SUPERSEDED: WARN,
@@ -50,17 +49,17 @@ class LineEvents:
     - ``table_changed``: is called when a station has become active or inactive
     """
 
-    def __init__(self, logger: RcutilsLogger, port: str, stations: Collection[int], *,
+    def __init__(self, log: NodeLog, port: str, stations: Collection[int], *,
                  scans: bool, seen: Seen, read: Callable[[Mapping, Values], None],
                  results: RosPublisher, table_changed: Callable[[], None],
                  answer: Callable[[WriteResult], None] = lambda result: None,
                  clock: Callable[[], float] = line_time) -> None:
         self.read = read
         self._clock = clock
-        self.notes = LimitedLog(logger, clock)
+        self.notes = log.notes
         self.unreadable_rows = UnreadableRows(self.notes)
         self.writes = WriteLog(port)
-        self._log = EventLog(logger, clock)
+        self._log = log.events
         self._port = port
         self._stations = stations
         self._scans = scans

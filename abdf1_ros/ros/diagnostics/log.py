@@ -17,13 +17,14 @@ The node's entries in the ROS log: all characters are visible, the number of ent
 
 A numbered event is logged once for each cause, and its repetitions are counted. While the cause
 lasts or returns, it is logged again from time to time. All other entries are limited to a few per
-minute about one subject. So neither a PLC nor a publisher can fill the disk.
+minute about one subject, over all reloads. So no PLC, publisher or caller of a service can fill
+the disk.
 """
 
 from __future__ import annotations
 
 from collections import defaultdict, deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 import traceback
@@ -32,7 +33,7 @@ from typing import NamedTuple
 from abdf1_ros.messages import Event, Message, Severity
 from abdf1_ros.pccc.address import Area
 from abdf1_ros.settings.mapping import Mapping
-from abdf1_ros.text import first, printable
+from abdf1_ros.text import counted, first, printable
 from rclpy.impl.logging_severity import LoggingSeverity
 from rclpy.impl.rcutils_logger import RcutilsLogger
 
@@ -196,6 +197,41 @@ class LimitedLog:
         count, subject.left_out = subject.left_out, 0
         more = f' ({count} more about {printable(news.about)} were not logged)' if count else ''
         _WRITE[news.severity](self._logger, printable(news.text) + more)
+
+
+class NodeLog:
+    """
+    The log of a node, which a reload keeps: ``events``, and ``notes`` for all other entries.
+
+    ``clock`` gives seconds.
+    """
+
+    def __init__(self, logger: RcutilsLogger, clock: Callable[[], float]) -> None:
+        self.events = EventLog(logger, clock)
+        self.notes = LimitedLog(logger, clock)
+        self._logger = logger
+        self._clock = clock
+        self._about_files: list[tuple[LoggingSeverity, str]] = []
+        self._told = _Subject()
+
+    def tell_files(self, entries: Sequence[tuple[LoggingSeverity, str]]) -> None:
+        """Write all that there is to say about both files, in one entry if that is known."""
+        entries, now = list(entries), self._clock()
+        if entries == self._about_files or self._told.has_enough(now):
+            self.notes.info('the files', f'the files were read again: {first_line(entries)}')
+            return
+        self._about_files = entries
+        self._told.written.append(now)
+        for severity, text in entries:
+            _WRITE[severity](self._logger, printable(text))
+
+
+def first_line(entries: Sequence[tuple[LoggingSeverity, str]]) -> str:
+    """Return the first of several entries, and the number of the others."""
+    if not entries:
+        return 'nothing to say'
+    others = len(entries) - 1
+    return entries[0][1] + (f' (and {counted(others, "other line")})' if others else '')
 
 
 class UnreadableRows:
