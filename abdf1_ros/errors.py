@@ -68,6 +68,10 @@ class CommandTimeout(LinkError):
     """The station is there, but its reply did not come within Cmd_Timeout (2508)."""
 
 
+class ReplyHindered(LinkError):
+    """The far end was busy all the time with sending another reply again (2508)."""
+
+
 class StationInactive(LinkError):
     """The station does not answer (2509); the argument is its ``number``."""
 

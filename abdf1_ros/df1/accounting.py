@@ -24,7 +24,7 @@ from abdf1_ros.df1.frames import Control, Frame, FrameFault, MAX_LINK_DATA, Symb
 from abdf1_ros.df1.packet import DIAGNOSTIC_REPLY, HEADER_SIZE, is_local_status, Packet, REPLY_BIT
 from abdf1_ros.df1.stations import ActiveStationList, MOST_OVERDUE
 from abdf1_ros.df1.tasks import Task
-from abdf1_ros.errors import CommandExpired, CommandTimeout, WrongCommandCode
+from abdf1_ros.errors import CommandExpired, CommandTimeout, ReplyHindered, WrongCommandCode
 from abdf1_ros.messages import Event, Message
 
 ReportEvent = Callable[[Event], None]
@@ -209,6 +209,12 @@ class Accounting(Tally):
         """End a task whose reply has not come within Cmd_Timeout."""
         self.late(task, keeps_others_waiting=keeps_others_waiting, cause=cause)
         task.fail(CommandTimeout(cause=cause))
+
+    def hindered(self, task: Task) -> None:
+        """End a task that waited for a busy far end; the failure blames no station."""
+        self.counters.command_timeouts += 1
+        self.note(Message.ERR_COMMAND_TIMEOUT, station=task.command.dst)
+        task.fail(ReplyHindered())
 
     def lost(self, number: int, now: float, cause: Message | None = None) -> None:
         """Make a station inactive, and report it; ``cause`` is what was wrong with its answer."""

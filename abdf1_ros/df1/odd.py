@@ -92,6 +92,10 @@ class OddCommands:
         """Tell whether a command has failed so often that the fault is its own."""
         return self.failures(key) >= _ODD
 
+    def rank(self, key: Hashable) -> int:
+        """Return the rank of a command that is odd, the least goes first: it may be new noise."""
+        return min(self.failures(key), _ODD + 1)
+
     def why(self, key: Hashable) -> str:
         """Return why a command has failed last, empty if it has not."""
         found = self.failed.get(key)
@@ -127,12 +131,11 @@ class OddCommands:
         return error
 
     def ended(self, key: Hashable, seconds: float, now: float, asker: Asker) -> None:
-        """Record that a command, good or not, has had the line for ``seconds`` until now."""
-        found = self.failed.get(key)
-        if found is not None and found.count >= _ODD:
-            found.when, found.took = now, seconds
-            if asker is not Asker.OWN:
-                self.turns.spent(seconds, now, asker)
+        """Record that an odd command, good or not, has had the line for ``seconds`` until now."""
+        found = self.failed[key]
+        found.when, found.took = now, seconds
+        if asker is not Asker.OWN:
+            self.turns.spent(seconds, now, asker)
 
     def passed(self, key: Hashable) -> None:
         """Forget the failures of a command: it got a whole reply, or is not sent any more."""

@@ -354,8 +354,11 @@ class FullDuplexPeer(EqualNode):
         if frame.fault is not None:
             event = count_fault(frame, self._settings.checksum, self._counters)
             self._accounting.report(event)
-            for entry in self._outstanding.values():
-                entry.cause = event.message
+            for (_, tns), entry in self._outstanding.items():
+                if frame.data[4:6] in (b'', tns.to_bytes(2, 'little')):
+                    entry.cause = event.message
+                else:
+                    entry.is_hindered = True
             is_given_up = frame.fault is FrameFault.NO_ETX and frame.received in (
                 Code.STX, Code.ENQ)  # its sender begins again, or sends an ENQ
             if is_given_up or frame.has_stopped:
@@ -437,7 +440,11 @@ class FullDuplexPeer(EqualNode):
         overdue = [key for key, entry in self._outstanding.items() if self._given_up(entry) <= now]
         for key in overdue:
             entry = self._outstanding.pop(key)
-            self._accounting.overdue(entry.task, keeps_others_waiting=True, cause=entry.cause)
+            if entry.is_hindered and entry.cause is None:
+                self._accounting.hindered(entry.task)
+            else:
+                self._accounting.overdue(
+                    entry.task, keeps_others_waiting=True, cause=entry.cause)
 
     def _respond(self, response: bytes) -> bytes:
         self._last_response = response

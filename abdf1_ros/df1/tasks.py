@@ -66,7 +66,8 @@ class Outstanding:
     ``deadline`` is when the reply is overdue (clock value in s), counted from the delivery
     (``is_delivered``). Before the delivery, its value depends on the kind of link. ``passed_over``
     counts other messages that came in place of the reply. ``is_probe``: its station was inactive.
-    ``cause`` is what was wrong with a message that came meanwhile, None for nothing.
+    ``cause`` is what was wrong with its reply, None for nothing. It ``is_hindered`` if another
+    damaged reply came meanwhile: the far end sends that one again first.
     """
 
     task: Task
@@ -75,6 +76,7 @@ class Outstanding:
     passed_over: int = 0
     is_probe: bool = False
     cause: Message | None = None
+    is_hindered: bool = False
 
 
 class TaskSource(Protocol):

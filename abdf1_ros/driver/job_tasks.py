@@ -112,8 +112,9 @@ class Job:
         self.sent, self.taken = False, now
         self._has_failed = False
         if self.key is not None:
-            self.is_suspect = bool(tasks.odd.failed) and tasks.odd.is_suspect(
-                self.key, self.station)
+            odd = tasks.odd
+            self.is_suspect = bool(odd.failed) and odd.is_suspect(self.key, self.station)
+            self._is_odd = self.is_suspect and odd.is_odd(self.key)
             self.blames = not self.is_suspect
         self._tasks, self._steps = tasks, self.steps(now)
         try:
@@ -151,7 +152,7 @@ class Job:
         if self.key is None:
             return
         odd, line = self._tasks.odd, self._tasks.line
-        if self.is_suspect:  # else it was a probe, or as good as any other
+        if self._is_odd:
             odd.ended(self.key, line.took(self.taken, line.now), line.now, self.asker)
         if self.is_whole and not self._has_failed:
             odd.passed(self.key)

@@ -22,7 +22,13 @@ from abdf1_ros.df1.frames import ACK, Duplex, ENQ, ETX, MAX_LINK_DATA, NAK, STX
 from abdf1_ros.df1.machine import LineTiming
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.settings import LinkSettings
-from abdf1_ros.errors import CommandExpired, CommandTimeout, PortLost, StationInactive
+from abdf1_ros.errors import (
+    CommandExpired,
+    CommandTimeout,
+    PortLost,
+    ReplyHindered,
+    StationInactive,
+)
 from abdf1_ros.messages import Message
 import pytest
 from support.cases import for_all
@@ -87,6 +93,22 @@ def test_replies_that_do_not_come_in_time_are_counted_and_told_until_one_does() 
     peer.said()
     peer.hear(ACK, peer.frame(later(REPLY, 9)))
     assert (peer.stations[1].has_no_replies, peer.stations[1].overdue) == (False, 0)
+
+
+@pytest.mark.parametrize(('number', 'is_blamed'), [(0, True), (9, False)])
+def test_damaged_reply_of_an_earlier_command_is_no_silence_of_the_station(
+        number: int, *, is_blamed: bool) -> None:
+    """The far end sends it again after each NAK, and the reply that we wait for only then."""
+    peer, task = acknowledged()
+    damaged = peer.frame(later(REPLY, number))
+    damaged = damaged[:-1] + bytes((damaged[-1] ^ 1,))
+    assert peer.hear(damaged) == NAK
+    peer.wait(CMD_TIMEOUT + 0.1)
+    assert peer.stations[1].overdue == is_blamed
+    error = task.result
+    assert isinstance(error, CommandTimeout if is_blamed else ReplyHindered)
+    assert error.cause is (Message.ERR_BAD_CRC if is_blamed else None)
+    assert peer.machine.counters.command_timeouts == 1
 
 
 @pytest.mark.parametrize('response', [ACK, NAK])

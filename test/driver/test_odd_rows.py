@@ -30,6 +30,7 @@ from abdf1_ros.settings.heartbeats import Fallback, While
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 import pytest
+from support.cases import long_unless
 from support.driver_bench import DriverBench
 from support.mappings import make_mapping
 from support.odd_device import Answer, frame, NAK, OddDevice, Wiring
@@ -40,6 +41,9 @@ NETWORKS: dict[str, dict[str, Any]] = {
 WIRINGS = {'Message': Wiring.HALF, 'Standard': Wiring.HALF, 'Peer': Wiring.FULL,
            'Radio': Wiring.RADIO}
 ALL_MODES = pytest.mark.parametrize('mode', NETWORKS)
+# For minutes of the line: a master that polls all the time takes long to play.
+LONG_MODES = pytest.mark.parametrize('mode', long_unless(
+    lambda mode: mode != 'Standard', zip(NETWORKS)))
 
 Filter = Callable[[bytes], bytes]
 
@@ -160,7 +164,7 @@ def run(mode: str, plc: Plc, *rows: Mapping, settle: float = 30.0, seconds: floa
                    for row, count in zip(GOOD, before, strict=True)]
 
 
-@ALL_MODES
+@LONG_MODES
 @pytest.mark.parametrize('wire', WIRES)
 def test_good_rows_of_a_bad_wire_come_nearly_as_often_as_without_an_odd_row(
         mode: str, wire: str) -> None:
@@ -195,7 +199,7 @@ def test_odd_rows_take_an_eighth_of_the_line_and_are_named(mode: str, fate: Fate
     assert {file_of(data) for when, data in plc.tried if when > 20.0} == {7, 10, 20, 21}
 
 
-@ALL_MODES
+@LONG_MODES
 def test_ten_odd_rows_have_the_eighth_together_in_turns(mode: str) -> None:
     files, fates = range(20, 30), [*REASONS]
     odd = [make_mapping(f'N{file}:0', plc='SLC', period=200) for file in files]
@@ -222,7 +226,7 @@ def test_row_comes_again_at_once_when_its_reply_passes(mode: str) -> None:
     assert not bench.driver.stations.odd.failed
 
 
-@ALL_MODES
+@LONG_MODES
 def test_block_is_divided_until_only_the_odd_row_fails(mode: str) -> None:
     rows = [make_mapping(f'N9:{at}', plc='SLC', period=500) for at in range(8)]
     plc = Plc(mode, fate=lambda data: Fate.DAMAGED if file_of(data) == 9 and (
@@ -243,7 +247,7 @@ def test_block_is_divided_until_only_the_odd_row_fails(mode: str) -> None:
     assert {bench.driver.points[row].error for row in rows} == {None}
 
 
-@ALL_MODES
+@LONG_MODES
 def test_block_is_divided_although_a_station_has_no_other(mode: str) -> None:
     rows = [make_mapping(f'N9:{at}', plc='SLC', period=200) for at in range(4)]
     plc = Plc(mode, fate=lambda data: Fate.DAMAGED if file_of(data) == 9 and (
@@ -254,7 +258,7 @@ def test_block_is_divided_although_a_station_has_no_other(mode: str) -> None:
     assert [bool(bench.driver.points[row].error) for row in rows] == [False, False, True, False]
 
 
-@ALL_MODES
+@LONG_MODES
 def test_long_row_is_read_in_packets_that_pass(mode: str) -> None:
     """A modem with a small buffer."""
     row = make_mapping('N9:0', plc='SLC', length=100, period=1000)
@@ -366,7 +370,7 @@ def test_device_server_gets_messages_while_other_rows_are_answered(mode: str) ->
     assert bench.listener.outcomes() == 10 * [Outcome.WRITTEN]
 
 
-@ALL_MODES
+@LONG_MODES
 @pytest.mark.parametrize('period', [200, 5000])
 def test_odd_row_is_no_matter_of_its_period(mode: str, period: int) -> None:
     """A queue that began again at its head would send it first each time."""

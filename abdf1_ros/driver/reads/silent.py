@@ -39,7 +39,8 @@ class Reads(WriteListener):
     Keep all read jobs; ``stations.probes`` decides when a silent station may be read.
 
     ``queue`` has the jobs that wait for their time, ``aside`` the jobs of silent stations. ``odd``
-    has the odd jobs that are due and wait for their turn, the first one due first.
+    has the odd jobs that are due and wait for their turn, the first one due first. Those that
+    have just become odd go before.
     """
 
     def __init__(self, stations: ActiveStationList) -> None:
@@ -184,9 +185,10 @@ class Reads(WriteListener):
             self._set_aside(job)
         if now < self._stations.odd.turns.next:
             return None
-        odd = next((job for job in self.odd if job.station not in busy), None)
-        if odd is None:
+        free = [job for job in self.odd if job.station not in busy]
+        if not free:
             return None
+        odd = min(free, key=lambda job: self._stations.odd.rank(job.key))
         job = self._instead_of(odd, now)
         if job is odd:
             self.odd.remove(job)

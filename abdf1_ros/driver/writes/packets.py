@@ -24,6 +24,7 @@ from abdf1_ros.errors import (
     LinkError,
     NoWholeReply,
     RemoteError,
+    ReplyHindered,
     StationInactive,
 )
 from abdf1_ros.pccc.dialect import Steps
@@ -32,7 +33,7 @@ from abdf1_ros.pccc.status import check_status, STS_ILLEGAL_COMMAND
 from abdf1_ros.pccc.steps import data_of, written_before
 
 # After these errors a station may execute the next packet.
-_TAKEN_OR_NOT = RemoteError, CommandTimeout, StationInactive, NoWholeReply
+_TAKEN_OR_NOT = RemoteError, CommandTimeout, StationInactive, NoWholeReply, ReplyHindered
 
 REWRITTEN = ('by reading the word and writing it back; a change that the PLC made in between is '
              'lost')
