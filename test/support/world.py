@@ -37,7 +37,7 @@ about heartbeats runs in each PLC where the plant has a ``scan``.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
 import hashlib
@@ -67,7 +67,7 @@ from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.ladder import Ladder, Lamp
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
-from support.devices import Device, Filter
+from support.devices import Device, Filter, link_of, symbol_by_symbol
 from support.driver_bench import DriverBench, Kept
 from support.losses import AirLosses, Losses, Lost
 from support.mappings import make_mapping
@@ -86,6 +86,7 @@ _MASTER_RESTS = 0.005  # s, of one that polls us, before all that it sends
 SLAVE_PRESET = 1000  # of a watchdog where none is printed, in units of 10 ms
 _ALL = 255  # stations
 _WRITES = (b'\x67', b'\xAA')  # functions of a typed write
+_REPLY = 0x40  # in the command of a reply
 _MASKED = 0x0F  # command of a write that names single words
 _TICKS = 30_000
 _FAR = 1  # what a VirtualLine calls the far end
@@ -443,6 +444,10 @@ class World(DriverBench):
     """
 
     odd: tuple[Filter, Filter] = USUAL  # what PLCs hear, and say
+    # Rows whose replies to reads never pass, from when on that is known, and until when it was.
+    odd_rows: frozenset[str] = frozenset()
+    odd_known, odd_last = math.inf, -math.inf
+    _damage: Filter = bytes
 
     def __init__(self, plant: Plant, seed: int,
                  change: Callable[[list[Mapping]], list[Mapping]] = list) -> None:
@@ -670,17 +675,35 @@ class World(DriverBench):
                   serve: Callable[[Packet], Packet]) -> Packet:
         """Execute a command that is no write; keep the words that it has read."""
         table, now = watched.plc.table, self.line.now
-        read = table.read
+        read, found = table.read, list[tuple[int, Area, int]]()
 
         def note(address: Address, words: int) -> bytes:
             data = read(address, words)
             watched.shown.append(Shown(now, address.area, address.offset, data))
+            found.extend((watched.plc.station, address.area, address.offset + at)
+                         for at in range(words))
             return data
 
         table.read = note  # type: ignore[method-assign]
         reply = serve(command)
         del table.read
+        if self.odd_rows and any(map(self._is_odd, found)):
+            self._damaged.add((watched.plc.station, command.tns))
         return reply
+
+    def _is_odd(self, place: tuple[int, Area, int]) -> bool:
+        """Tell whether an odd row has a word."""
+        station, area, offset = place
+        return any(row.station == station and row.address.area == area
+                   and 0 <= offset - row.address.offset < row.length
+                   for row in map(self.rows.__getitem__, self.odd_rows))
+
+    def _break_check(self, data: bytes) -> bytes:
+        """Damage a message that is a reply of an odd row."""
+        link = link_of(data)
+        is_odd = link and link[2] & _REPLY and (
+            link[1], int.from_bytes(link[4:6], 'little')) in self._damaged
+        return data[:-1] + bytes((data[-1] ^ 1,)) if is_odd else data
 
     def _note_sent(self, data: bytes, start: float, receiver: int) -> None:
         if receiver == _FAR and not self.master:
@@ -713,6 +736,8 @@ class World(DriverBench):
     def _say(self, data: bytes) -> bytes:
         self.wire.update(b'%f<' % self.line.now + data)
         data = self.odd[1](self.losses.say(data) if self.losses else data)
+        if self.odd_rows:
+            data = self._damage(data)
         return b'' if self.is_unheard else data
 
     def _breathe(self) -> None:
@@ -801,6 +826,19 @@ class World(DriverBench):
     def is_unheard(self) -> bool:
         """Tell whether nothing reaches us."""
         return self.is_silent or self.is_queued or self.is_deaf
+
+    def damage_rows(self, tags: Iterable[str]) -> None:
+        """Let the replies with words of some rows never pass, as of bytes that something eats."""
+        if self.odd_rows:
+            self.odd_last = self.line.now
+        self.odd_rows, self.odd_known = frozenset(tags), math.inf
+        self._damaged = set[tuple[int, int]]()  # their replies, by station and TNS
+        self._damage = symbol_by_symbol(self._break_check)
+
+    @property
+    def is_divided(self) -> bool:
+        """Tell whether rows may not be read together because of rows that are or were odd."""
+        return bool(self.odd_rows) or self.odd_last > self.opened
 
     def break_wire(self) -> None:
         """Let nothing reach us any more."""
@@ -910,6 +948,7 @@ class World(DriverBench):
         self.line.noise = QUIET
         self.losses = None
         self.odd = USUAL
+        self.damage_rows(())
         self.line.chunks[0] = _FIFO
         self.holds = self.clocks.lead = 0.0
         self.clocks.set(0.0, self.line.now)

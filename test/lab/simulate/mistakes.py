@@ -46,7 +46,9 @@ if __name__ == '__main__':  # pytest has its own paths
 
 from abdf1_ros.df1.machine import Machine
 from abdf1_ros.df1.master import HalfDuplexMaster
+from abdf1_ros.df1.odd import OddCommands
 from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.probes import Probes
 from abdf1_ros.driver.agenda import Agenda
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.guests import GuestJob
@@ -67,6 +69,7 @@ from abdf1_ros.driver.writes.under_way import WriteJob
 from abdf1_ros.pccc.values import Codec
 from abdf1_ros.plan.bounds import Times
 from abdf1_ros.plan.planner import Block
+from abdf1_ros.plan.refusals import Refusals
 from abdf1_ros.settings.mapping import Mapping
 from simulate.rules import Broken
 from simulate.run import Story
@@ -396,6 +399,9 @@ MISTAKES = (
             _always(None)),
     Mistake('8', 'a guest over a fallback is not seen', FallbackRow, 'write_ended',
             _sees_no_guest),
+    Mistake('29', 'each failure is one of the station', OddCommands, 'is_suspect', _always(False)),
+    Mistake('29', 'odd rows have no share', Probes, 'spent', _always(None)),
+    Mistake('29', 'a block with an odd row stays whole', Refusals, 'refused', _always(None)),
     Mistake('guests', 'a command of a guest lives 60 s longer', GuestJob, '__init__',
             _lives_longer),
     Mistake('guests', 'a guest is blamed for the station', GuestJob, 'blames',

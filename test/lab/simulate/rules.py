@@ -29,6 +29,7 @@ from operator import attrgetter
 from abdf1_ros.conform.codec import BlockCheck, next_symbol, SymbolKind
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.machine import MOST_LATE
+from abdf1_ros.df1.probes import OTHERS_SHARE
 from abdf1_ros.df1.radio import LONGEST_WAIT
 from abdf1_ros.driver.write import Outcome, WriteResult
 from abdf1_ros.plan.bounds import MODE_PERIOD
@@ -388,7 +389,8 @@ class Withheld(Rule):
 
     def stand(self) -> None:
         world = self.world
-        for row in world.rows.values() if self._new else ():
+        rows = world.rows.values() if self._new and not world.is_divided else ()
+        for row in rows:
             if row.is_guarded and row.station in self._new:
                 point, asked = world.driver.points[row], self._read[f'clock_{row.station}']
                 # At a start that is told when it has had its time to begin.
@@ -865,6 +867,28 @@ class View(Rule):
                 self._known.discard(number)
 
 
+class Fresh(Rule):
+    text = 'a row whose packets pass is not staler than promised because of other rows (29)'
+
+    def __init__(self, world: World) -> None:
+        super().__init__(world)
+        self._read: dict[str, float] = {}
+
+    def read(self, when: float, tag: str, station: int, values: list[int]) -> None:
+        self._read[tag] = when
+
+    def stand(self) -> None:
+        world = self.world
+        for row, point in world.driver.points.items() if world.odd_known < math.inf else ():
+            if row.tag in world.odd_rows or row.serves or row.is_guarded or row.is_heartbeat:
+                continue
+            since = max(self._read.get(row.tag, 0.0), world.odd_known)
+            # The tries of all odd rows together have an eighth, and one of them is under way.
+            most = (1 + 1 / OTHERS_SHARE) * point.stale_time + self.flight
+            self.demand(world.line.now - since < most, row.tag, 'was not read for more than', most,
+                        'beside', sorted(world.odd_rows))
+
+
 class Served(Rule):
     text = 'what we serve is a message that is young enough, or the fallback (12)'
 
@@ -929,7 +953,7 @@ class OneOwner(Rule):
 RULES: tuple[type[Rule], ...] = (
     Results, Ages, Stamps, Turns, Values, Guards, Withheld, Beats, BeatsAfterFallbacks, Order,
     Outputs, OneResult, Probes, Unheard, Queued, AfterRun, Held, ReadOnly, Guests, GuestAges,
-    OnTheWire, View, Served, Rungs, Answers, ReadBack, Repeats, Taken)
+    OnTheWire, View, Fresh, Served, Rungs, Answers, ReadBack, Repeats, Taken)
 
 
 class Judge:

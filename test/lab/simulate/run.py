@@ -114,7 +114,7 @@ class Story:
         world.ill[station] = world.line.now
         if world.line.noise is not QUIET or world.line.now < world.away or not world.is_alive \
                 or not world.driver.is_online or world.is_unheard \
-                or world.odd is not USUAL:
+                or world.odd is not USUAL or world.odd_rows:
             world.ill[0] = max(world.line.now, world.away)
 
     def publish_much(self) -> None:
@@ -377,9 +377,25 @@ def _odd_device(story: Story, station: int) -> None:
         story.world.behave_oddly(story.dice.choice(devices))
 
 
+def _odd_rows(story: Story, station: int) -> None:
+    """Damage all replies of some rows, until they are known and for some time more."""
+    world, dice = story.world, story.dice
+    if world.network.mode == 'Slave':
+        return
+    share = dice.choice([0.2, 0.5, 0.8])
+    rows = [row.tag for row in world.rows.values() if row.reads and not row.serves]
+    world.damage_rows(tag for tag in rows if dice.random() < share)
+    story.be_quiet()
+    # A try has its share of the line, each row has three, and each division of a block one.
+    a_try = world.network.line.cmd_timeout * (1 + world.plant.retries)
+    story.endure(station, 6 * a_try * len(rows))
+    world.odd_known = world.line.now
+    story.wait(20.0)
+
+
 _NO_EXCUSE, _QUEUED = 'messages refused', 'queued'
 # Which excuse nothing.
-_EXPECTED = ('guest', 'gateway holds', 'another network', 'frames lost')
+_EXPECTED = ('guest', 'gateway holds', 'another network', 'frames lost', 'odd rows')
 _TROUBLES: dict[str, Callable[[Story, int], None]] = {
     'noise': _noise, 'silence': _silence, 'refusal': _refusal,
     _NO_EXCUSE: _refused_messages, 'replies lost': _lost_replies,
@@ -388,7 +404,8 @@ _TROUBLES: dict[str, Callable[[Story, int], None]] = {
     'PROGRAM': _program, 'download': _download, 'killed': _kill, 'slow PLC': _slowness,
     'other writer': _other_writer, 'other bridge': _other_bridge, 'guest': _guest,
     'gateway holds': _gateway_holds, 'frames lost': _lost_frames, 'another network': _overwritten,
-    'receive wire broken': _broken_wire, _QUEUED: _queued, 'odd device': _odd_device}
+    'receive wire broken': _broken_wire, _QUEUED: _queued, 'odd device': _odd_device,
+    'odd rows': _odd_rows}
 
 
 @dataclass(slots=True)

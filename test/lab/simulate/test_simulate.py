@@ -26,6 +26,7 @@ from simulate.mistakes import Mistake, MISTAKES
 from simulate.rules import (
     Answers,
     Broken,
+    Fresh,
     GuestAges,
     OnTheWire,
     Order,
@@ -242,6 +243,27 @@ def test_value_that_no_read_has_shown_does_not_stand() -> None:
     steady.shown['word'] = [(now - 9.0, wanted)]  # before it was confirmed
     assert steady.why_unproven('word', wanted, now).startswith('no read has shown it')
     assert 'another value' in steady.why_unproven('word', b'[9]', now)
+
+
+def test_row_that_is_staler_than_promised_beside_odd_rows_is_found() -> None:
+    world = World(Plant('Message'), seed=1)
+    rule = Fresh(world)
+    world.damage_rows(['counter_1'])
+    world.run(20.0)
+    world.odd_known = world.line.now
+    count = len(world.reads)
+    for _ in range(200):
+        world.run(STEP)
+        for when, row, _ in world.reads[count:]:
+            rule.read(when, row.tag, 1, [])
+        count = len(world.reads)
+        rule.stand()
+    assert 'counter_1' not in {row.tag for when, row, _ in world.reads if when > 1.0}
+    world.fall_silent(1)
+    with pytest.raises(Broken):
+        for _ in range(200):
+            world.run(STEP)
+            rule.stand()
 
 
 @pytest.mark.parametrize('mistake', MISTAKES)
