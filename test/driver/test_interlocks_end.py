@@ -311,6 +311,21 @@ def test_rule_5_what_stands_is_written_once_more_at_the_end_after_all_else() -> 
     assert cell.results()[-1] == END and cell.results().count(END) == 1
 
 
+@pytest.mark.parametrize('text', ['N7:0', 'N10:0'])
+def test_rule_5_what_was_under_way_when_the_end_began_is_written_once_more(text: str) -> None:
+    cell = Cell(beat_row() if text == 'N10:0' else speed_row(), start=False)
+    store(cell.plc, text, [99])
+    cell.bench.open()
+    cell.bench.run_until(lambda: cell.word(text) != 99)  # its reply is not here yet
+    interlocks = begin_end(cell)
+    store(cell.plc, text, [98])
+    while interlocks.has_to_wait(is_open=True):
+        assert cell.now < 2.0
+        cell.run(0.005)
+    assert cell.word(text) == (0 if text == 'N10:0' else 7)
+    assert (interlocks.unconfirmed(cell.now), interlocks.not_repeated()) == ([], [])
+
+
 @pytest.mark.parametrize('fault', ['refused', 'silent', 'no answer'])
 def test_rule_5_what_stands_has_one_try_and_is_named_where_it_is_not_written_again(
         fault: str) -> None:

@@ -97,7 +97,7 @@ class Interlocks(WriteListener):
         self._has_begun = False
         # stations that answered when the end began
         self._awaited: frozenset[int] = frozenset()
-        # rows that stood when the end began, until they are written once more
+        # rows that stood, or were under way, when the end began: until they are written once more
         self._standing: tuple[OwnRow, ...] = ()
 
     @property
@@ -458,10 +458,13 @@ class Interlocks(WriteListener):
             row.ended(outcome, now)
         else:
             self._fallback_ended(row, write, outcome, now)
-        if outcome is Outcome.WRITTEN:
+        if outcome is not Outcome.WRITTEN:
+            if row in self._standing:  # it stood before, so it is not tried again
+                row.words.again_at = math.inf
+        elif row.tried < self.conditions.ended < math.inf:  # under way when the end began
+            self._standing += (row,)
+        else:
             self._leave_standing(row)
-        elif row in self._standing:  # it stood before, so it is not tried again
-            row.words.again_at = math.inf
         plc.plan()  # the row is due, so its heartbeats are judged again, too (rule 3 b)
         if outcome is not Outcome.NOT_SENT:
             refusal = '' if outcome is Outcome.WRITTEN else str(claim.error)
