@@ -249,13 +249,15 @@ class DriverBench:
     def hand_over(self, mappings: Sequence[Mapping], first_tns: int = 0) -> None:
         """Go on with a driver of new files that knows what the last one knows, like the link."""
         before, self.mappings = self.driver, mappings
+        is_online = before.is_online
         settings = replace(self._settings, first_tns=first_tns)
         driver = Driver(self.network, mappings, settings, self.listener)
         before.machine.stop(PortLost(READ_AGAIN), self.line.now)
         driver.take_over(before)
         self.line.exchange(before.machine, driver.machine, keeps_port=True)
         self.driver = driver
-        self.open()
+        if is_online:
+            self.open()
 
     def breathe(self) -> None:
         """Let the executor run ten times a second from now on, while it ``is_alive``."""

@@ -453,7 +453,8 @@ class World(DriverBench):
                  change: Callable[[list[Mapping]], list[Mapping]] = list) -> None:
         self.plant, self.seed = plant, seed
         self.dice = Random(seed)
-        self.drivers = 0  # killed so far
+        # Killed or replaced so far; the number of the first driver of this process.
+        self.drivers = self.process = 0
         self.killed_at = 0.0
         self._killed: list[Driver] = []
         self.others: dict[int, OtherBridge] = {}  # by the station of the PLC
@@ -489,7 +490,7 @@ class World(DriverBench):
         self.losses: Losses | None = None
         self.wire = hashlib.sha256()
         self._values = dict.fromkeys(self.rows, 0)
-        self.is_silent = self.is_queued = False  # behind another client
+        self.is_silent = self.is_queued = self.has_ended = False  # queued: behind another client
         self.deaf_since, self.heard_again = math.inf, -math.inf  # when the wire to us broke
         self.plcs = {station: self._watch(station) for station in range(1, plant.stations + 1)}
         self.far.hear, self.far.say = self._hear, self._say
@@ -853,15 +854,21 @@ class World(DriverBench):
 
     def kill(self, pause: float) -> None:
         """Kill the driver; another one begins after a pause."""
-        self.drivers += 1
-        self.killed_at = self.opened = self.line.now
-        self.said.clear()
+        self._begin_anew()
+        self.process = self.drivers
         self._killed.append(self.driver)  # so that no end of its generators says anything
         self.restart(self.dice.randrange(0x10000))
         self.hold_up(pause)
         self._dead_until = self.away
         self.clocks.forget()
         self.executor_ran = self.line.now
+
+    def _begin_anew(self) -> None:
+        """Record that another driver begins."""
+        self.drivers += 1
+        self.has_ended = False
+        self.killed_at = self.opened = self.line.now
+        self.said.clear()
 
     def hold_up(self, seconds: float) -> None:
         """Let the process of the driver stand still."""
@@ -889,6 +896,17 @@ class World(DriverBench):
         self.lose_port()
         self.open()
         self.opened = self.line.now
+
+    def unplug_for(self, seconds: float) -> None:
+        """Lose the port for a while."""
+        self.lose_port()
+
+        def plug() -> None:
+            if not self.driver.is_online and not self.has_ended:
+                self.open()
+                self.opened = self.line.now
+
+        self.at(self.line.now + seconds, plug)
 
     def be_queued(self) -> None:
         """Connect again to a device server that another client has the line of."""
@@ -953,35 +971,51 @@ class World(DriverBench):
         self.holds = self.clocks.lead = 0.0
         self.clocks.set(0.0, self.line.now)
 
-    def end(self) -> None:
-        """End in order (rule 5), and stay ended for as long as a gateway keeps."""
+    def wind_down(self, limit: float = LONGEST_END) -> None:
+        """Write what an end writes, and wait for it, as the node does (rule 5)."""
         interlocks = self.driver.interlocks
         self.ended = self.line.now
         interlocks.wind_down()
         self.line.wake(self.driver.machine)
-        limit = self.line.now + LONGEST_END
-        while not interlocks.is_over and self.line.now < limit:
+        give_up = self.line.now + limit
+        while self.line.now < give_up and interlocks.has_to_wait(is_open=self.driver.is_online):
             self.run(STEP / 10)
+
+    def end(self) -> None:
+        """End in order, and stay ended for as long as a gateway keeps."""
+        self.wind_down()
         self.driver.machine.stop(PortLost('the end'), self.line.now)
+        self.has_ended = True
         self.run(self.held_for)
 
+    def begin(self) -> None:
+        """Start a process in the place of one that has ended; some rows have a new Length."""
+        self._read_files(self._rows_read_again())
+        self.process = self.drivers
+        self.restart()
+
     def reload(self) -> None:
-        """Put another driver in the place of one that has ended; some rows have a new Length."""
-        for row in self.plant.mappings():
-            if row.tag.startswith(('clock', 'held')):
-                length = self.dice.choice([row.length, row.length // 2])
-                self.rows[row.tag] = replace(self.rows[row.tag], length=length)
-        self.use([*self.rows.values()])
+        """Go on with files that were read again, after ``wind_down``."""
+        self.use(self._rows_read_again())
 
     def use(self, rows: Sequence[Mapping]) -> None:
         """Let a driver of these rows go on, which knows what the driver before it knows."""
+        self._read_files(rows)
+        self.hand_over(rows, self.dice.randrange(0x10000))
+
+    def _rows_read_again(self) -> list[Mapping]:
+        """Return a new row for each row; some have another Length."""
+        lengths = {row.tag: row.length for row in self.plant.mappings()
+                   if row.tag.startswith(('clock', 'held'))}
+        return [replace(row, length=self.dice.choice([lengths[tag], lengths[tag] // 2])
+                        if tag in lengths else row.length) for tag, row in self.rows.items()]
+
+    def _read_files(self, rows: Sequence[Mapping]) -> None:
         self._take_rows(rows)
+        self.mappings = rows
         for watched in self.plcs.values():
             watched.take_places(self._places(watched.plc.station))
-        self.drivers += 1
-        self.killed_at = self.opened = self.line.now
-        self.said.clear()
-        self.hand_over(rows, self.dice.randrange(0x10000))
+        self._begin_anew()
 
     def _take_rows(self, rows: Sequence[Mapping]) -> None:
         self.rows = {row.tag: row for row in rows}

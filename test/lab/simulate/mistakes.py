@@ -254,6 +254,19 @@ def _awaits_those_that_answer(before: Any) -> Any:
         row.mapping.station in self._awaited for row in self._plc_of if not row.is_confirmed))
 
 
+def _waits_for_no_port(has_to_wait: Any) -> Any:
+    return lambda self, *, is_open, **named: is_open and has_to_wait(
+        self, is_open=is_open, **named)
+
+
+def _lets_stand(make_all_due: Any) -> Any:
+    def make_due_wrongly(self: Interlocks, now: float) -> None:
+        make_all_due(self, now)
+        self._standing = ()
+
+    return make_due_wrongly
+
+
 def _stores_nothing(init: Any) -> Any:
     def init_wrongly(self: Interlocks, mappings: Any, writes: Any, writing: Any, served: Any,
                      *arguments: Any) -> None:
@@ -351,6 +364,10 @@ MISTAKES = (
             _polls_before),
     Mistake('5', 'the end does not wait for silent PLCs', Interlocks, 'is_over',
             _awaits_those_that_answer),
+    Mistake('5', 'the end does not wait for a lost port', Interlocks, 'has_to_wait',
+            _waits_for_no_port),
+    Mistake('5', 'what stands is not written at the end', Interlocks, '_make_all_due',
+            _lets_stand),
     Mistake('6', 'a message is not too old when it is sent', WriteJob, '__init__',
             _never_too_old),
     Mistake('11', 'messages go before heartbeats and fallbacks', Agenda, '_own_first',

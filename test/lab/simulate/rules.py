@@ -25,6 +25,7 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator
 import math
 from operator import attrgetter
+import re
 
 from abdf1_ros.conform.codec import BlockCheck, next_symbol, SymbolKind
 from abdf1_ros.df1.frames import Duplex
@@ -41,6 +42,8 @@ _LEAST_LIFE_SIGN = 1.0  # s
 _MOMENT = 0.02  # s, for what goes out before it
 _REWRITTEN = 5.0  # s after which a fallback is written again
 _READ_BACK = 'read back: the PLC holds'
+_READ_VALUE = re.compile(r'(\d+) was read where')
+_READ_BACK_WITHIN = 2.0  # s, of a late value to its read
 _REPEATED = 10.0  # s, until a number of a command may come again
 _NEVER_EXECUTED = {Outcome.NOT_SENT, Outcome.REFUSED, Outcome.SUPERSEDED, Outcome.FAILED}
 
@@ -104,7 +107,7 @@ class Results(Rule):
         self._outcomes: dict[tuple[str, int], Outcome] = {}
         self._by: set[tuple[str, int]] = set()
         self._safe: defaultdict[str, float] = defaultdict(lambda: -math.inf)
-        self._seen = self._driver = 0
+        self._seen = self._process = 0
         self._looked = 0.0
         # To wait, to be sent and polled for, to be read back, and while the process stood still.
         self._limit = 3 * world.plant.write_timeout + 4 * world.longest + 8.0
@@ -146,8 +149,8 @@ class Results(Rule):
         now = self._looked = self.world.line.now
         new = self.world.keys[self._seen:]
         self._seen += len(new)
-        if self._driver != self.world.drivers:  # what the killed one knew is gone
-            self._driver = self.world.drivers
+        if self._process != self.world.process:  # what the killed one knew is gone
+            self._process = self.world.process
             self._waits.clear()
             return
         self._waits.update((key, now) for key in new if key not in self._outcomes)
@@ -522,7 +525,7 @@ class Order(Rule):
         # Not after a port that was lost and opened again: a fresh row needs no fallback then.
         # A PLC whose replies were lost until then may have no room for another one.
         is_well = max(world.ill[station], world.ill[0], world.opened) <= world.killed_at \
-            and world.heard_again < world.killed_at
+            and world.heard_again < world.killed_at and not world.holds
         if not left or not is_well or entry.value in GUESTS or entry.is_late \
                 or entry.tag.startswith('other') or entry.driver != world.drivers:
             return
@@ -772,7 +775,7 @@ class Guests(Rule):
     def __init__(self, world: World) -> None:
         super().__init__(world)
         self._waits = 0.0  # since when there was a command without a reply
-        self._driver = 0
+        self._process = 0
         self._missing = 0
         self._by: list[tuple[float, int, int]] = []
 
@@ -786,8 +789,8 @@ class Guests(Rule):
     def stand(self) -> None:
         world = self.world
         missing = len(world.asked) - len(world.answered) - self._missing
-        if self._driver != world.drivers:  # a killed one replies no more
-            self._driver, self._missing, missing = world.drivers, self._missing + missing, 0
+        if self._process != world.process:  # a killed one replies no more
+            self._process, self._missing, missing = world.process, self._missing + missing, 0
         self.demand(missing >= 0, 'more replies than commands')
         if not missing:
             self._waits = world.line.now
@@ -909,6 +912,27 @@ class Served(Rule):
         self._seen = len(world.served)
 
 
+class Foreign(Rule):
+    text = 'no value that we have sent is told as the value of another program (19)'
+
+    def __init__(self, world: World) -> None:
+        super().__init__(world)
+        self._seen = 0
+
+    def stand(self) -> None:
+        world = self.world
+        new = world.listener.foreign[self._seen:]
+        self._seen += len(new)
+        for when, text, _ in new:
+            found = _READ_VALUE.search(text)
+            assert found is not None
+            value = int(found[1])
+            late = [entry for entry in reversed(world.executed) if entry.tag.startswith('beat')
+                    and entry.is_late and entry.driver >= world.process
+                    and entry.when > when - _READ_BACK_WITHIN]
+            self.demand(value not in {entry.value for entry in late}, text, 'at', when, late)
+
+
 class OneOwner(Rule):
     text = 'beside another writer of its word a heartbeat ends with 0 (19)'
 
@@ -953,7 +977,8 @@ class OneOwner(Rule):
 RULES: tuple[type[Rule], ...] = (
     Results, Ages, Stamps, Turns, Values, Guards, Withheld, Beats, BeatsAfterFallbacks, Order,
     Outputs, OneResult, Probes, Unheard, Queued, AfterRun, Held, ReadOnly, Guests, GuestAges,
-    OnTheWire, View, Fresh, Served, Rungs, Answers, ReadBack, Repeats, Taken)
+    OnTheWire, View, Fresh, Served, Rungs, Answers, ReadBack, Repeats, Taken,
+    Foreign)
 
 
 class Judge:

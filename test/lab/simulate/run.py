@@ -25,7 +25,7 @@ from __future__ import annotations
 
 import argparse
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import partial
 import math
@@ -40,7 +40,7 @@ if __name__ == '__main__':  # pytest has its own paths
 
 from abdf1_ros.driver.write import Outcome
 from abdf1_ros.pccc.emulated import Setting
-from abdf1_ros.settings.heartbeats import READS_IN_TIME
+from abdf1_ros.settings.heartbeats import HAND_OVER, READS_IN_TIME
 from simulate.rules import Broken, Judge
 from simulate.steady import Steady
 from support.devices import DEVICES
@@ -68,8 +68,9 @@ class Story:
         self.judge = Judge(self.world)
         self.troubles: Counter[str] = Counter()
         self._rates: dict[str, float] = {}
-        # Only such a port can be queued at, so it is more often.
-        self._likely = [_QUEUED] * 4 if self.world.plant.may_store else []
+        # Only such a port can be queued at, only a gateway keeps writes: they come more often.
+        self._likely = [_QUEUED] * 4 * self.world.plant.may_store \
+            + [_NEW_FILES] * 4 * (self.world.plant.gateway is not None)
 
     def run(self) -> None:
         """Let it happen; raise Broken where a rule does not hold."""
@@ -207,6 +208,11 @@ class Story:
             if world.plant.stations == 1 and not world.holds and self.dice.random() < 0.3:
                 world.break_wire()
                 world.run(self.dice.uniform(0.0, 1.0))
+            elif self.dice.random() < 0.3:
+                world.unplug_for(self.dice.uniform(0.0, 1.5))
+            if self.dice.random() < 0.5:  # not seen by us, and perhaps over a fallback that stands
+                world.run(self.dice.choice([0.0, world.plant.after / 1000 + 0.5]))
+                world.overwrite(1)
             world.end()
             if world.is_deaf:
                 self._mark(1)
@@ -214,16 +220,28 @@ class Story:
             if not world.is_deaf:  # then the judge knows what was sent
                 self._demand_safe_words()
             world.mend()
-            world.reload()
+            world.begin()
             self._recover()
 
-    def _demand_safe_words(self) -> None:
+    def reload(self) -> None:
+        """Read new files; what is not safe by then is named (rule 5)."""
         world = self.world
+        world.wind_down(HAND_OVER)
+        self.judge.look()  # at what came for the rows of before
+        interlocks = world.driver.interlocks
+        named = interlocks.unconfirmed(world.line.now) + interlocks.not_repeated()
+        if not world.plant.is_read_only:
+            self._demand_safe_words(text.partition(' ')[0] for text in named)
+        world.reload()
+        self.judge.look()
+
+    def _demand_safe_words(self, named: Iterable[str] = ()) -> None:
+        world, left_out = self.world, {*named}
         for station, watched in world.plcs.items():
             words = {row.tag: watched.word(watched.places[row.tag])
-                     for row in world.rows_of(station, ('w', 'beat'))}
-            is_zero = not words[f'beat_{station}'] or station in self.judge.owner.since
-            if {value for tag, value in words.items() if tag[0] == 'w'} != {SAFE} or not is_zero:
+                     for row in world.rows_of(station, ('w', 'beat')) if row.tag not in left_out}
+            is_zero = not words.get(f'beat_{station}') or station in self.judge.owner.since
+            if {value for tag, value in words.items() if tag[0] == 'w'} - {SAFE} or not is_zero:
                 raise Broken('End', f'not in order (5): {words}', world)
 
 
@@ -297,6 +315,21 @@ def _download(story: Story, station: int) -> None:
 
 def _kill(story: Story, station: int) -> None:
     story.world.kill(story.dice.choice([0.0, 0.5, 2.0]))
+
+
+def _new_files(story: Story, station: int) -> None:
+    """Read new files, perhaps after writes that a gateway still keeps, or without the port."""
+    world = story.world
+    if story.dice.random() < 0.5:
+        story.publish_much()
+    else:  # for safe values to stand
+        story.be_quiet()
+        story.wait(max(world.plant.after, world.plant.requires or 0) / 1000 + 1.0)
+    world.holds = story.dice.choice([0.0, 0.5]) if world.plant.gateway else 0.0
+    story.wait(story.dice.uniform(0.0, 2.0))
+    if not world.holds and story.dice.random() < 0.3:
+        world.unplug_for(story.dice.uniform(0.0, 2.5))
+    story.reload()
 
 
 def _slowness(story: Story, station: int) -> None:
@@ -393,7 +426,7 @@ def _odd_rows(story: Story, station: int) -> None:
     story.wait(20.0)
 
 
-_NO_EXCUSE, _QUEUED = 'messages refused', 'queued'
+_NO_EXCUSE, _QUEUED, _NEW_FILES = 'messages refused', 'queued', 'new files'
 # Which excuse nothing.
 _EXPECTED = ('guest', 'gateway holds', 'another network', 'frames lost', 'odd rows')
 _TROUBLES: dict[str, Callable[[Story, int], None]] = {
@@ -404,8 +437,8 @@ _TROUBLES: dict[str, Callable[[Story, int], None]] = {
     'PROGRAM': _program, 'download': _download, 'killed': _kill, 'slow PLC': _slowness,
     'other writer': _other_writer, 'other bridge': _other_bridge, 'guest': _guest,
     'gateway holds': _gateway_holds, 'frames lost': _lost_frames, 'another network': _overwritten,
-    'receive wire broken': _broken_wire, _QUEUED: _queued, 'odd device': _odd_device,
-    'odd rows': _odd_rows}
+    'receive wire broken': _broken_wire, _NEW_FILES: _new_files, _QUEUED: _queued,
+    'odd device': _odd_device, 'odd rows': _odd_rows}
 
 
 @dataclass(slots=True)

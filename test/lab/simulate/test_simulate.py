@@ -21,11 +21,13 @@ from unittest import mock
 
 from abdf1_ros.df1.frames import ACK, ENQ
 from abdf1_ros.driver.write import Outcome
+from abdf1_ros.settings.heartbeats import HAND_OVER, LONGEST_END
 import pytest
 from simulate.mistakes import Mistake, MISTAKES
 from simulate.rules import (
     Answers,
     Broken,
+    Foreign,
     Fresh,
     GuestAges,
     OnTheWire,
@@ -40,7 +42,19 @@ from simulate.steady import Steady
 from support.cases import long_unless
 from support.devices import DEVICES
 from support.losses import Losses, Lost
-from support.world import GUESTS, MODES, Plant, Said, Sent, STEP, World
+from support.world import (
+    BEAT,
+    Executed,
+    GUESTS,
+    MODES,
+    OUTPUTS,
+    Plant,
+    SAFE,
+    Said,
+    Sent,
+    STEP,
+    World,
+)
 
 
 @pytest.mark.parametrize('mode', long_unless(lambda mode: 'ateway' not in mode, zip(MODES)))
@@ -135,7 +149,7 @@ def test_plc_that_has_replies_left_need_not_take_the_first_zero() -> None:
     world.run(0.1)
     world.end()
     world.mend()
-    world.reload()
+    world.begin()
     count = len(world.executed)
     world.run(2.0)
     assert world.executed[count].tag == 'w0_1'  # it answered the 0 with NAK
@@ -224,13 +238,60 @@ def test_reload_may_bring_other_lengths() -> None:
     lengths = set()
     for _ in range(6):
         world.end()
-        world.reload()
+        world.begin()
         count = len(world.reads)
         world.run(4.0)
         found = {len(values) for _, row, values in world.reads[count:] if row.tag == 'held_1'}
         assert found == {world.rows['held_1'].length}
         lengths |= found
     assert lengths == {10, 21}
+
+
+def test_reload_replaces_driver_and_rows_and_keeps_what_may_land() -> None:
+    world = World(Plant('Gateway', requires=800), seed=1)
+    world.run(3.0)
+    before, row = world.driver, world.rows['w0_1']
+    world.publish(row)
+    world.run(0.1)
+    world.wind_down(HAND_OVER)
+    assert (world.plcs[1].word(OUTPUTS), world.plcs[1].word(BEAT)) == (SAFE, 0)
+    world.holds = 1.0
+    world.run(0.6)  # the fallback is not due again, and 0 is not sent
+    world.reload()
+    world.mend()
+    assert world.driver is not before and world.rows['w0_1'] is not row
+    assert world.process == 0 and world.drivers == 1
+    world.run(3.0)
+    world.publish(world.rows['w0_1'])
+    world.run(0.3)
+    assert world.results[-1].outcome is Outcome.WRITTEN
+
+
+def test_own_late_value_that_is_told_as_foreign_is_found() -> None:
+    world = World(Plant('Gateway'), seed=1)
+    world.run(2.0)
+    rule, now = Foreign(world), world.line.now
+    world.executed.append(Executed(now, 1, 'beat_1', 780, 0, 0, is_late=True))
+    world.listener.foreign.append((now, '5 was read where 0 was written', False))
+    rule.stand()
+    world.listener.foreign.append((now, '780 was read where 0 was written', False))
+    with pytest.raises(Broken):
+        rule.stand()
+
+
+@pytest.mark.parametrize('seconds', [0.5, 9.0])
+def test_end_without_the_port_is_safe_or_names_what_is_not(seconds: float) -> None:
+    story = Story(1, 'Message')
+    world = story.world
+    row = next(row for row in world.messages if row.tag == 'w0_1')
+    story.wait(3.0)
+    world.publish(row)
+    world.run(0.3)
+    world.unplug_for(seconds)
+    world.end()
+    named = world.driver.interlocks.unconfirmed(world.line.now)
+    assert ('w0_1' in named) is (seconds > LONGEST_END)
+    assert (world.plcs[1].word(OUTPUTS) == SAFE) is (seconds < LONGEST_END)
 
 
 def test_value_that_no_read_has_shown_does_not_stand() -> None:

@@ -352,11 +352,11 @@ class Telling:
         self._wind_down(HAND_OVER, ended, lambda row: (row.extent, row.fallback) not in safe)
 
     def _open_again(self, seconds: float) -> None:
-        world, driver = self.world, self.world.driver
+        world, process = self.world, self.world.process
 
         def open_again() -> None:
-            if world.driver is driver and not driver.is_online:
-                driver.interlocks.resume()
+            if world.process == process and not world.driver.is_online:
+                world.driver.interlocks.resume()
                 self._cut_off()
                 world.open()
                 world.opened = world.line.now
