@@ -50,6 +50,17 @@ def test_reads_come_when_they_are_due_and_the_period_counts_from_then() -> None:
     assert job.due == 0.1
 
 
+def test_read_that_is_too_old_each_time_does_not_go_first_each_time() -> None:
+    """Its packets always take too long, or the process stands still in each of them."""
+    old, others = make_job('N7:0'), [make_job(f'N9:{at}') for at in (0, 50, 100)]
+    bench = Bench(old, *others)
+    found: Counter[ReadJob | None] = Counter()
+    for turn in range(40):
+        old.is_unfinished = True  # as after ReadTooOld
+        found[bench.read(0.1 * turn, took=0.09)] += 1
+    assert found == dict.fromkeys([old, *others], 10)
+
+
 @pytest.mark.parametrize(('fallback', 'limits'), [
     (None, (3.5, 2.5, math.inf)), (FALLBACK, (2.0, 1.0, 2.0)),
     (Fallback((7,), 9000), (3.5, 2.5, 10.5))])

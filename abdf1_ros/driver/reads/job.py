@@ -114,6 +114,11 @@ class ReadJob(Job):
         self.reply_size = self._packets[0].reply_size
 
     @property
+    def is_begun(self) -> bool:
+        """Tell whether some packets of a read have come that are still good."""
+        return bool(self._words)
+
+    @property
     def is_whole(self) -> bool:  # type: ignore[override]
         return len(self._words) == len(self._packets)
 

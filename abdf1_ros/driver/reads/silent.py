@@ -264,8 +264,8 @@ class Reads(WriteListener):
             return
         if self.aside:
             self.release(job.station, now)
-        if job.is_unfinished:
-            self.queue.put(job, job.due)
+        if job.is_unfinished:  # one that begins again is behind those that have waited meanwhile
+            self.queue.put(job, job.due if job.is_begun else now)
         elif job.started < job.refreshed or job.started < job.wanted:  # before the write or call
             self.queue.put(job, now)
         elif job.is_on_demand:
