@@ -123,8 +123,8 @@ class HalfDuplexMaster(Link):
             if number not in self._line.faults:  # else it answers, and may reply to others
                 self._line.accounting.lost(number, self._machine.now, error.cause)
             return
-        except CommandTimeout:
-            station.overdue += 1
+        except CommandTimeout as error:
+            station.overdue += error.cause is None
             return
         station.overdue = 0
         self._line.take_unwanted(reply)

@@ -313,3 +313,22 @@ def test_cmd_timeout_begins_when_the_command_goes_out_after_its_tx_delay(standar
     rig[7].delay = 0.6
     rig.start()
     assert isinstance(rig.ask(7, run=6.0).result, Packet)
+
+
+@pytest.mark.parametrize('retries', [3, 60])
+def test_reply_to_another_slave_that_is_damaged_makes_no_station_silent(retries: int) -> None:
+    """It may reply to ours all the time."""
+    rig = bench(False, 7, 8, retries=retries)
+    whole = rig[8].handle
+
+    def damaged(symbol: frames.Symbol) -> bytes:
+        data = whole(symbol)
+        return data[:-1] + bytes((data[-1] ^ 1,)) if data.startswith(frames.STX) else data
+
+    rig[8].handle = damaged  # type: ignore[method-assign]
+    rig.message(7, 8)
+    rig.start()
+    rig.ask(7, run=2.0)
+    assert rig[8].served and rig.master.counts()['enq_limit_exceeded']
+    station = rig.master.stations[8]
+    assert (station.active, station.overdue) == (True, 0)
