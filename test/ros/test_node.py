@@ -482,16 +482,16 @@ def test_publisher_of_our_topics_or_beside_them_is_told(
         ours = Node('abdf1', context=twin.context, use_global_arguments=False)
         ours.create_publisher(msg.Int16MultiArray, '/abdf1/read/speed', 1)
         ros.until_status(bench.diagnostics, 'link', ros.WARN)
-        foreign = stub.node.create_publisher(msg.UInt16MultiArray, '/abdf1/active_stations', 1)
+        foreign = stub.node.create_publisher(msg.Int16MultiArray, '/abdf1/read/speed', 1)
         for topic in '/abdf1/write/speed', '/write/recipe':
             stub.node.create_publisher(msg.Int16MultiArray, topic, 1)
         status = ros.until_status(
             bench.diagnostics, 'topics', ros.ERROR, lambda status: 'recipe' in status.message)
         assert status.message == (
-            'ERROR: /stub publishes /abdf1/active_stations too; published, but not written: '
+            'ERROR: /stub publishes /abdf1/read/speed too; published, but not written: '
             '/abdf1/write/speed, /write/recipe')
         assert ros.details(status) == {
-            '/abdf1/active_stations': 'is published by /stub too',
+            '/abdf1/read/speed': 'is published by /stub too',
             '/abdf1/write/speed': 'is published by /stub, but not written: speed is only read',
             '/write/recipe': 'is published by /stub, but not written: this bridge takes '
                              '/abdf1/write/recipe'}
