@@ -12,16 +12,20 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Where the files of this package are, and their version."""
+"""Where the files of this package are, their version, and paths that begin at the home folder."""
 
 from __future__ import annotations
 
 import argparse
 from contextlib import suppress
+import os
 from pathlib import Path
 import sys
 
 _PACKAGE = 'abdf1_ros'
+
+# How a path begins that shells expand, and launch files, services and quotes do not.
+_HOMES = '~/', '$HOME/'
 
 
 def package_version() -> str:
@@ -47,6 +51,12 @@ class ShowVersion(argparse.Action):
         with suppress(OSError):  # as argparse does for its help
             print(f'abdf1_ros {package_version()}')
         parser.exit()
+
+
+def expanded(path: str) -> str:
+    """Return a path that a user has typed, with the home folder for a leading ~/ or $HOME/."""
+    home = next((begin for begin in _HOMES if path.startswith(begin)), '')
+    return os.path.expanduser('~/' + path.removeprefix(home)) if home else path
 
 
 def config_file(name: str) -> Path:

@@ -23,6 +23,7 @@ that includes this one, a misspelt protection does. ``ros2 launch abdf1_ros brid
 
 import sys
 
+from abdf1_ros.paths import expanded
 from abdf1_ros.ros.launching import (
     descriptions,
     misspelt,
@@ -100,7 +101,8 @@ def bridge(arguments: dict[str, str], restore: OpaqueFunction) -> Node:
     # ...).
     parameters: list[ParameterFile | dict[str, ParameterValue]] = []
     if arguments['params_file']:
-        parameters.append(ParameterFile(arguments['params_file'], allow_substs=True))
+        parameters.append(ParameterFile(
+            expanded(arguments['params_file']), allow_substs=True))
     if given:
         parameters.append(given)
     return Node(

@@ -23,6 +23,7 @@ launch.
 
 import sys
 
+from abdf1_ros.paths import expanded
 from abdf1_ros.ros.launching import misspelt, parameter_types, scope_of, unknown_arguments
 from launch import LaunchContext, LaunchDescription
 from launch.actions import (
@@ -65,10 +66,11 @@ def line(namespace: str) -> GroupAction:
 
 def start_lines(context: LaunchContext) -> list[Node]:
     """Return all bridges in one process."""
-    return [all_lines(OpaqueFunction(function=scope_of(context)))]
+    lines_file = expanded(context.launch_configurations['lines_file'])
+    return [all_lines(lines_file, OpaqueFunction(function=scope_of(context)))]
 
 
-def all_lines(restore: OpaqueFunction) -> Node:
+def all_lines(lines_file: str, restore: OpaqueFunction) -> Node:
     """
     Return all bridges in one process, started again unless their settings are faulty.
 
@@ -77,9 +79,10 @@ def all_lines(restore: OpaqueFunction) -> Node:
     def started_again(event: ProcessExited, context: LaunchContext) -> list[TimerAction]:
         if context.is_shutdown or event.returncode == FAULTY:
             return []
-        return [TimerAction(period=2.0, actions=[GroupAction([restore, all_lines(restore)])])]
+        return [TimerAction(period=2.0, actions=[GroupAction([
+            restore, all_lines(lines_file, restore)])])]
 
-    sections = ParameterFile(LaunchConfiguration('lines_file'), allow_substs=True)
+    sections = ParameterFile(lines_file, allow_substs=True)
     return Node(package='abdf1_ros', executable='lines', output='screen', parameters=[sections],
                 sigterm_timeout=LONGEST_END, on_exit=started_again)
 

@@ -176,11 +176,12 @@ def test_bridge_needs_its_files(launch: Starter) -> None:
 
 
 def test_arguments_reach_the_node_and_beat_the_parameter_file(
-        launch: Starter, tmp_path: Path) -> None:
+        launch: Starter, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv('HOME', str(tmp_path))
     params = tmp_path / 'params.yaml'
     params.write_text('/**: {ros__parameters: {port: /dev/from_file, stale_after: 7.0}}\n')
     with Observer() as observer:
-        process = launch('bridge.launch.py', *EXAMPLE, f'params_file:={params}',
+        process = launch('bridge.launch.py', *EXAMPLE, 'params_file:=~/params.yaml',
                          'port:=/dev/ttyS99', 'namespace:=cell', 'name:=line', 'read_only:=yes',
                          'write_timeout:=3', 'default_period:=50')
         process.wait_for('/dev/ttyS99: cannot open the port')
@@ -325,10 +326,11 @@ def test_three_lines_run_side_by_side(tmp_path: Path, one_process: str) -> None:
 
 
 def test_faulty_lines_in_one_process_are_not_started_again(
-        launch: Starter, tmp_path: Path) -> None:
+        launch: Starter, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     faulty = tmp_path / 'lines.yaml'
     faulty.write_text('/press/abdf1: {ros__parameters: {net_file: /no, map_file: /no}}\n')
-    process = launch('three_lines.launch.py', f'lines_file:={faulty}', 'one_process:=true')
+    monkeypatch.setenv('HOME', str(tmp_path))
+    process = launch('three_lines.launch.py', 'lines_file:=~/lines.yaml', 'one_process:=true')
     process.wait_for('exit code 2')
     process.result()  # nothing is left to be done
     assert process.text.count('process started with pid') == 1

@@ -12,8 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Where the files of the package are found, and the end that a signal asks for."""
+"""Where files are found, paths in the home folder, and the end that a signal asks for."""
 
+import ast
+from importlib import import_module
 from pathlib import Path
 import signal
 import subprocess
@@ -23,15 +25,63 @@ from types import SimpleNamespace
 import abdf1_ros
 from abdf1_ros import paths
 from abdf1_ros.__main__ import main
+from abdf1_ros.cli.main import COMMANDS
 from abdf1_ros.signals import EndRequest
 import pytest
+from support.cases import for_all
+from support.commands import call, Output
+
+ROOT = Path(__file__).resolve().parent.parent
+PLACES = {'FILE', 'FOLDER', 'LINK', 'MAP', 'NET', 'PORT_A', 'ZIP', '--port', '--pty'}
+
+
+@for_all(('typed', 'meant'), [
+    ('~/net.csv', '/home/me/net.csv'), ('$HOME/net.csv', '/home/me/net.csv'),
+    ('~/', '/home/me/'), ('', ''), ('~', '~'), ('~root/x', '~root/x'), ('a/~/b', 'a/~/b'),
+    ('pty:~/plc', 'pty:~/plc'), ('$HOMES/x', '$HOMES/x'), ('$USER/x', '$USER/x')])
+def test_home_folder_at_the_begin_of_a_path(typed: str, meant: str) -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv('HOME', '/home/me')
+        assert paths.expanded(typed) == meant
+
+
+@pytest.mark.parametrize('words', [
+    ['check', '~/x', '$HOME/y'], ['sniff', '~/x'], ['simulator', '--data=~/x'],
+    ['sniff', '--port=$HOME/x'], ['conform', 'slave', '--port', '~/x'],
+    ['plc', 'read', 'N7:0', '--net=~/x'], ['plc', 'import', '$HOME/x']])
+def test_commands_look_for_quoted_paths_in_the_home_folder(
+        words: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Output) -> None:
+    monkeypatch.setenv('HOME', str(tmp_path))
+    name, *args = words
+    said = call(import_module(COMMANDS[name][0]).main, capsys, *args)
+    assert said.status in (1, 2)
+    assert str(tmp_path / 'x') in said.out + said.err
+    assert '$HOME' not in said.out + said.err
+
+
+def test_every_argument_of_a_command_that_is_a_path_may_begin_at_the_home_folder() -> None:
+    found = 0
+    for file in (ROOT / 'abdf1_ros' / 'cli').rglob('*.py'):
+        for call_ in ast.walk(ast.parse(file.read_text('utf-8'))):
+            if not isinstance(call_, ast.Call) or getattr(
+                    call_.func, 'attr', '') != 'add_argument':
+                continue
+            named = {word.arg: word.value for word in call_.keywords}
+            words = {node.value for part in (*call_.args, *filter(None, [named.get('metavar')]))
+                     for node in ast.walk(part) if isinstance(node, ast.Constant)}
+            if words & PLACES:
+                found += 1
+                made_by = named.get('type')
+                assert isinstance(made_by, ast.Name), f'{file.name}: {words}'
+                assert made_by.id in ('expanded', '_name'), f'{file.name}: {words}'
+    assert found > 20
 
 
 @pytest.mark.parametrize('name', ['net.csv', 'map.csv', 'simulator.csv'])
 def test_file_of_the_source_tree(name: str) -> None:
     path = paths.config_file(name)
     assert path.is_file()
-    assert path.parent == Path(__file__).resolve().parent.parent / 'config'
+    assert path.parent == ROOT / 'config'
 
 
 @pytest.fixture

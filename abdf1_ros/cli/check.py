@@ -49,6 +49,7 @@ from abdf1_ros.cli.terminal import (
     YELLOW,
 )
 from abdf1_ros.driver.settings import DriverSettings
+from abdf1_ros.paths import expanded
 from abdf1_ros.plan.bounds import Bound
 from abdf1_ros.plan.forecast import USUAL_RESPONSE_TIME
 from abdf1_ros.plan.planner import Block
@@ -274,12 +275,13 @@ def _summary(name: str, found: Findings, report: Report | None) -> str:
 
 def _parse(args: Sequence[str] | None) -> argparse.Namespace:
     parser = command_parser('check', __doc__, _EPILOG)
-    parser.add_argument('net', metavar='NET', help='the net CSV, or a folder with the files of '
-                        'many lines: NAME_net.csv and NAME_map.csv')
-    parser.add_argument('map', metavar='MAP', nargs='?', help='the map CSV')
+    parser.add_argument('net', metavar='NET', type=expanded,
+                        help='the net CSV, or a folder with the files of many lines: '
+                             'NAME_net.csv and NAME_map.csv')
+    parser.add_argument('map', metavar='MAP', nargs='?', type=expanded, help='the map CSV')
     parser.add_argument('--json', action='store_true',
                         help='print one JSON object, with every tag of every block')
-    parser.add_argument('--html', metavar='FILE',
+    parser.add_argument('--html', metavar='FILE', type=expanded,
                         help='also draw the poll cycle and the time that the Periods need, for a '
                              'browser')
     duration = number_option(f'ms from 0 to {MAX_PERIOD}', 0, MAX_PERIOD)
@@ -289,7 +291,7 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument('--response-time', type=duration, metavar='MS',
                         default=USUAL_RESPONSE_TIME * 1000,
                         help='time that a PLC needs for each answer (default: %(default)g)')
-    parser.add_argument('--heard', metavar='FILE', action='append', default=[],
+    parser.add_argument('--heard', metavar='FILE', action='append', default=[], type=expanded,
                         help='list the rows that a recording of the line ("sniff --save") would '
                         'fill in Mode Listen; may be repeated')
     options = parser.parse_args(args)

@@ -78,7 +78,7 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.stations import MAX_STATION
 from abdf1_ros.errors import FormatError
 from abdf1_ros.line_names import host_and_port
-from abdf1_ros.paths import config_file, package_version
+from abdf1_ros.paths import config_file, expanded, package_version
 from abdf1_ros.pccc.families import decode_identity
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity
@@ -341,7 +341,7 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
                         help=f'number of these words, up to {_MOST_WORDS} (default: %(default)s)')
     parser.add_argument('--yes', action='store_true',
                         help='also run cases that write, and cases that reset the line')
-    parser.add_argument('--data', metavar='FILE',
+    parser.add_argument('--data', metavar='FILE', type=expanded,
                         help='target master or client: CSV of the data tables that we simulate '
                              '(default: the example)')
     parser.add_argument('--only', action='append', default=[], metavar='CASE',
@@ -351,7 +351,8 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument('--report', action='store_true',
                         help='print the result as text for an issue, with the row for '
                              'docs/tested_with.md')
-    parser.add_argument('--pty', metavar='LINK', help='make a pseudo-terminal of this name')
+    parser.add_argument('--pty', metavar='LINK', type=expanded,
+                        help='make a pseudo-terminal of this name')
     parser.add_argument('--tcp', metavar='HOST:PORT', help='listen on a TCP port')
     parser.add_argument('--echo', action='store_true',
                         help='half duplex: the adapter echoes the bytes that we send')

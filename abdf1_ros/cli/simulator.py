@@ -60,7 +60,7 @@ from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.line_names import host_and_port
 from abdf1_ros.numbers import decimal_number
-from abdf1_ros.paths import config_file
+from abdf1_ros.paths import config_file, expanded
 from abdf1_ros.pccc.data_table import NoSuchFile
 from abdf1_ros.ports.descriptor import Port, PortAround
 from abdf1_ros.ports.endpoints import Endpoint, PtyEndpoint, SerialEndpoint, TcpEndpoint
@@ -350,7 +350,8 @@ def _announcer(say: Callable[[str], None]) -> Callable[[PortState], None]:
 def parse_options(args: Sequence[str] | None) -> argparse.Namespace:
     """Return the options of the simulator."""
     parser = command_parser('simulator', __doc__, _EPILOG)
-    parser.add_argument('--data', help='CSV of the data tables (default: config/simulator.csv)')
+    parser.add_argument('--data', metavar='FILE', type=expanded,
+                        help='CSV of the data tables (default: config/simulator.csv)')
     line = parser.add_mutually_exclusive_group()
     line.add_argument('--pty', metavar='NAME', type=_name,
                       help='make a pseudo-terminal of this name (default: a new name, which is '
@@ -384,7 +385,7 @@ def parse_options(args: Sequence[str] | None) -> argparse.Namespace:
 def _name(text: str) -> str:
     if not text:
         raise argparse.ArgumentTypeError('the name is missing')
-    return text
+    return expanded(text)
 
 
 def _scheduled(text: str) -> tuple[float, str]:

@@ -61,6 +61,7 @@ from abdf1_ros.cli.terminal import (
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.numbers import whole_number
+from abdf1_ros.paths import expanded
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.tap import is_pty, Tap
 from abdf1_ros.ports.trace import begun_now, Trace
@@ -282,12 +283,12 @@ def _decode(options: argparse.Namespace) -> int:
 
 def parse(args: Sequence[str] | None) -> argparse.Namespace:
     parser = command_parser('sniff', __doc__, _EPILOG)
-    parser.add_argument('files', metavar='FILE', nargs='*',
+    parser.add_argument('files', metavar='FILE', nargs='*', type=expanded,
                         help='captures, pcap, pcapng or hex dumps, decoded in this order')
     parser.add_argument('--binary', action='store_true', help='the files are raw bytes')
-    parser.add_argument('--port', metavar='NAME',
+    parser.add_argument('--port', metavar='NAME', type=expanded,
                         help=f'listen on a serial port, {URLS}, pty, or pty:NAME')
-    parser.add_argument('--tap', nargs=2, metavar=('PORT_A', 'PORT_B'),
+    parser.add_argument('--tap', nargs=2, metavar=('PORT_A', 'PORT_B'), type=expanded,
                         help='connect two ports and listen; ">" is from A to B')
     parser.add_argument('--baud', type=whole_option, choices=BAUD_RATES,
                         help=f'baud rate of the ports (default: {_DEFAULT_BAUD}); for a file: '
@@ -301,18 +302,18 @@ def parse(args: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument('--json', action='store_true',
                         help='print one JSON object per line, the summary last')
     parser.add_argument('--summary', action='store_true', help='print the summary only')
-    parser.add_argument('--save', metavar='FILE',
+    parser.add_argument('--save', metavar='FILE', type=expanded,
                         help='also write the traffic of a port or tap into a capture')
-    parser.add_argument('--pcapng', metavar='FILE',
+    parser.add_argument('--pcapng', metavar='FILE', type=expanded,
                         help='also write the traffic as packets, for Wireshark')
-    parser.add_argument('--html', metavar='FILE',
+    parser.add_argument('--html', metavar='FILE', type=expanded,
                         help='also draw the line as a timeline with its faults, for a browser')
-    parser.add_argument('--report', metavar='ZIP',
+    parser.add_argument('--report', metavar='ZIP', type=expanded,
                         help='make a bundle of captures for a report: bytes, words, summary, '
                              'processors, versions')
-    parser.add_argument('--settings', metavar='FILE', nargs='+', default=[],
+    parser.add_argument('--settings', metavar='FILE', type=expanded, nargs='+', default=[],
                         help='net and map CSV for the bundle')
-    parser.add_argument('--conformance', metavar='FILE', nargs='+', default=[],
+    parser.add_argument('--conformance', metavar='FILE', type=expanded, nargs='+', default=[],
                         help='results of conform for the bundle')
     parser.add_argument('--anonymous', action='store_true',
                         help='leave values and names out of the bundle and the timeline')

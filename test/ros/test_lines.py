@@ -115,6 +115,18 @@ def test_parameter_file_that_ros_would_refuse(tmp_path: Path, text: str, expecte
     assert str(error.value) == f'{path}{expected}'
 
 
+def test_parameter_file_in_the_home_folder(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: Output) -> None:
+    monkeypatch.setenv('HOME', str(tmp_path))
+    assert files.with_home(['lines', '--ros-args', '--params-file', '~/a.yaml', '-p', '~/b',
+                            '--log-config-file', '$HOME/log']) == [
+        'lines', '--ros-args', '--params-file', f'{tmp_path}/a.yaml', '-p', '~/b',
+        '--log-config-file', f'{tmp_path}/log']
+    path = yaml_file(tmp_path, 'a: [')
+    assert main(['lines', '--ros-args', '--params-file', '$HOME/lines.yaml']) == 2
+    assert f'{path}:1:' in capfd.readouterr().err
+
+
 def test_what_is_left_out_changes_nothing_else(tmp_path: Path) -> None:
     kept = "  a:\n    ros__parameters: {day: 2001-99-99, no-1: 010, text: '5', list: [1, 2]}\n"
     path = yaml_file(tmp_path, (

@@ -117,6 +117,13 @@ def test_files_are_shown_as_resolved_paths(
     assert node.get_parameter('map_file').value == files['map_file']
 
 
+def test_cells_keep_what_a_shell_would_expand(make_node: Nodes, files: Files) -> None:
+    """A service has another home than the person who has written the file."""
+    write_csv(Path(files['net_file']), 'Station,Com_Port', ['5,~/plc'])
+    (told,) = problems_of(make_node(files))
+    assert 'Com_Port = "~/plc" should be a number from 1, a device path' in told
+
+
 def test_one_line_tells_what_the_node_runs_with(configured: Configured, files: Files) -> None:
     rows = [*MAP, 'b,Write,N7:20,2,SLC,4,,,recipe']
     write_csv(Path(files['map_file']), f'{MAP_HEADER},Topic', rows)
@@ -464,7 +471,11 @@ def test_parameter_of_the_command_line_is_for_this_node(
 def test_port_in_the_home_directory_and_a_substitution_of_launch_files(
         make_node: Nodes, files: Files, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv('HOME', '/home/me')
-    assert configure(make_node({**files, 'port': '~/plc'})).port == '/home/me/plc'
+    for name in ('port', 'net.com_port'):
+        for port in ('~/plc', '$HOME/plc'):
+            assert configure(make_node({**files, name: port})).port == '/home/me/plc'
+    kept = configure(make_node({**files, 'trace_file': '$HOME/line.cap'}))
+    assert kept.parameters.trace_file == '/home/me/line.cap'
     assert problems_of(make_node({**files, 'map_file': '/$(find-pkg-share x)/map.csv'})) == [
         'parameter map_file: /$(find-pkg-share x)/map.csv: $(...) is for launch files; write the '
         'path']

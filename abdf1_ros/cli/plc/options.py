@@ -24,6 +24,7 @@ from abdf1_ros.cli.plc.data import Radix
 from abdf1_ros.cli.plc.line import DEFAULTS, MODES
 from abdf1_ros.cli.terminal import number_option
 from abdf1_ros.numbers import whole_number
+from abdf1_ros.paths import expanded
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.processor import Processor
@@ -73,7 +74,7 @@ def add_plc_type(parser: argparse._ActionsContainer,
 
 def add_folder(parser: argparse.ArgumentParser, what: str) -> None:
     """Add the option for the folder of new files."""
-    parser.add_argument('--into', metavar='FOLDER', default='.',
+    parser.add_argument('--into', metavar='FOLDER', type=expanded, default='.',
                         help=f'the folder for {what} (default: the current folder)')
 
 
@@ -95,9 +96,9 @@ def add_line_options(parser: argparse.ArgumentParser, defaults: LineDefaults,
                      has_link: bool = True) -> None:
     """Add the options of the line; ``has_link`` False leaves out duplex and --timeout."""
     group = parser.add_argument_group('line')
-    group.add_argument('--port', metavar='NAME',
+    group.add_argument('--port', metavar='NAME', type=expanded,
                        help='serial port, or URL such as socket://192.168.0.9:4001')
-    group.add_argument('--net', metavar='FILE',
+    group.add_argument('--net', metavar='FILE', type=expanded,
                        help=f'take {defaults.net} from this net CSV; options override the file')
     group.add_argument('--baud', help=f'baud rate: {", ".join(map(str, BAUD_RATES))} '
                                       f'(default: {defaults.baud})')
@@ -159,9 +160,9 @@ def add_addresses(parser: argparse.ArgumentParser) -> None:
                              'rows that are read')
     parser.add_argument('--length', metavar='N',
                         help='elements of each address (default: 1, or the size of the range)')
-    parser.add_argument('--map', metavar='FILE',
+    parser.add_argument('--map', metavar='FILE', type=expanded,
                         help='a map CSV; its tags are shown beside the addresses')
-    parser.add_argument('--record', metavar='FILE',
+    parser.add_argument('--record', metavar='FILE', type=expanded,
                         help='record all bytes of the line in a capture file, for "sniff"')
     parser.add_argument('--radix', type=str.lower, choices=tuple(RADIXES), default='dec',
                         help='number base of whole numbers (default: %(default)s)')

@@ -28,7 +28,7 @@ from abdf1_ros.df1.polling import STANDARD
 from abdf1_ros.df1.settings import PollingSettings
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.numbers import Checked
-from abdf1_ros.paths import config_file
+from abdf1_ros.paths import config_file, expanded
 from abdf1_ros.plan.forecast import USUAL_STALE_AFTER
 from abdf1_ros.plan.usable_rows import usable_rows
 from abdf1_ros.problems import ConfigurationError, Place, Problem
@@ -138,7 +138,7 @@ _OF_STANDARD_POLLING = ('poll_list', 'priority_poll_list', 'poll_group_size', 'p
                         'send_in_sequence')
 
 # Shown as absolute paths, because a relative path does not say which file it is.
-_PATHS = ('net_file', 'map_file')
+_PATHS = ('net_file', 'map_file', 'trace_file')
 
 
 @dataclass(frozen=True, slots=True)
@@ -270,7 +270,7 @@ def _from_files(given: Given, parameters: Parameters, problems: list[Problem], *
     if parameters.port:
         try:
             other = make_network({'com_port': (
-                os.path.expanduser(parameters.port), 'parameter port')}, network)
+                expanded(parameters.port), 'parameter port')}, network)
             port, network = other.port, replace(network, remarks=other.remarks)
         except ConfigurationError as error:
             problems += error.problems
@@ -284,6 +284,8 @@ def _overridden(given: Given, network: Network) -> Network:
     """Return the network with the values of parameters ``net.*`` in place of the file's values."""
     texts = {name: text_of(given[entry.parameter]) for name, entry in FIELDS.items()
              if entry.parameter in given}
+    if 'com_port' in texts:
+        texts['com_port'] = expanded(texts['com_port'])
     cells = network.cells()
     return make_network({  # compare as text: 5.0 equals 5, but is not a valid station
         name: (text, f'parameter {FIELDS[name].parameter}') for name, text in texts.items()
@@ -405,10 +407,10 @@ def _declare(node: Node, given: Given, name: str, default: object,
     Declare a parameter and return its value, even a value of a wrong type or range.
 
     rclpy only shows types and ranges; we check them, with better messages. A path is shown
-    resolved, but returned as the user gave it, with ~ expanded.
+    resolved, but returned as the user gave it, with the home folder.
     """
     if name in _PATHS and isinstance(value := given.get(name), str):
-        path = os.path.expanduser(value)  # the shell does not expand net_file:=~/net.csv
+        path = expanded(value)
         node.declare_parameter(name, _resolved(path), descriptor, ignore_override=True)
         return path
     try:

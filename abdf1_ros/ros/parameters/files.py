@@ -22,11 +22,15 @@ from pathlib import Path
 import re
 from tempfile import TemporaryDirectory
 
+from abdf1_ros.paths import expanded
 from abdf1_ros.problems import ConfigurationError, Place, Problem
 from abdf1_ros.text import printable
 import yaml
 
 _PARAMETERS = 'ros__parameters'
+
+# The options of ROS with a file.
+_PARAMETER_FILE, _LOG_SETTINGS = '--params-file', '--log-config-file'
 _MOST_LEVELS = 20
 _TAGS = ('!', *(f'tag:yaml.org,2002:{kind}' for kind in ('bool', 'float', 'int', 'null', 'str')))
 # Namespaces, a node name, and wildcards for both.
@@ -36,7 +40,13 @@ _NAME = re.compile(r'[\w/*]+', re.ASCII)
 def parameter_files(args: Sequence[str]) -> list[str]:
     """Return the parameter files among the arguments of a process."""
     return [path for option, path in zip(args, args[1:], strict=False)
-            if option == '--params-file']
+            if option == _PARAMETER_FILE]
+
+
+def with_home(args: Sequence[str]) -> list[str]:
+    """Return the arguments of a process, with the home folder in the paths of ROS's options."""
+    return [expanded(text) if option in (_PARAMETER_FILE, _LOG_SETTINGS) else text
+            for option, text in zip(['', *args], args, strict=False)]
 
 
 def parameter_tree(path: str) -> yaml.Node | None:

@@ -37,7 +37,7 @@ from abdf1_ros.console import Console
 from abdf1_ros.paths import ShowVersion
 from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.ros.diagnostics.log import bug_text
-from abdf1_ros.ros.parameters.files import usable_files
+from abdf1_ros.ros.parameters.files import usable_files, with_home
 from abdf1_ros.settings.heartbeats import LONGEST_END
 from abdf1_ros.signals import EndRequest
 from abdf1_ros.text import printable
@@ -132,7 +132,7 @@ def run_ros(name: str, parser: argparse.ArgumentParser,
             os._exit(0)
         end_by_the_clock()
 
-    given = list(sys.argv if args is None else args)
+    given = with_home(sys.argv if args is None else args)
     with EndRequest(_ending_signals(), begin_end) as ended, ExitStack() as stack:
         try:
             with usable_files(given, leaves_out) as usable:

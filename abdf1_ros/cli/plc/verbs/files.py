@@ -31,6 +31,7 @@ from abdf1_ros.cli.plc.options import add_plc_type, add_station, stations_option
 from abdf1_ros.cli.plc.session import complain, Session
 from abdf1_ros.cli.plc.targets import check_via, routes_of, rows_of_map, Targets
 from abdf1_ros.cli.terminal import EXIT_FAILED, Progress
+from abdf1_ros.paths import expanded
 from abdf1_ros.pccc.file_search import DataFile
 from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings.rows import Rows
@@ -43,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='file numbers up to 254 (default: the list of the PLC, or 0-31; with '
                              '--map FILE the files of its rows)')
     add_plc_type(parser)
-    parser.add_argument('--map', metavar='FILE', nargs='?', const='',
+    parser.add_argument('--map', metavar='FILE', type=expanded, nargs='?', const='',
                         help='print rows for a new map CSV; with FILE, check that map CSV against '
                              "the PLC's files")
 

@@ -34,6 +34,7 @@ from abdf1_ros.cli.plc.session import complain
 from abdf1_ros.cli.terminal import called, EXIT_FAILED, number_option
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.numbers import whole_number
+from abdf1_ros.paths import expanded
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.plan.report import make_report
 from abdf1_ros.problems import ConfigurationError
@@ -51,7 +52,8 @@ _COLUMN_ROLES = {
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments."""
-    parser.add_argument('file', metavar='FILE', help='the export or list: CSV; Ignition: JSON')
+    parser.add_argument('file', metavar='FILE', type=expanded,
+                        help='the export or list: CSV; Ignition: JSON')
     add_folder(parser, 'map.csv')
     parser.add_argument('--station', metavar='LIST', type=stations_option, dest='stations',
                         default=(DEFAULT_STATION,),

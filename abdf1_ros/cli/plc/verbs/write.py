@@ -35,6 +35,7 @@ from abdf1_ros.cli.plc.session import complain, Session
 from abdf1_ros.cli.plc.targets import no_value, Targets, to_write
 from abdf1_ros.cli.terminal import colour, EXIT_UNKNOWN, EXIT_USAGE, GREEN, is_wanted
 from abdf1_ros.errors import Abdf1Error
+from abdf1_ros.paths import expanded
 
 UNREAD_STATUS = EXIT_USAGE
 """Exit status if the output cannot be printed: the write has not begun, so nothing was written."""
@@ -67,7 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     address.values = parser.add_argument(
         'values', metavar='VALUE', nargs='+', action='extend',
         help='numbers, also as 0x or 0b; 0 or 1 for bits; one text for a string')
-    parser.add_argument('--map', metavar='FILE',
+    parser.add_argument('--map', metavar='FILE', type=expanded,
                         help='a map CSV: ADDRESS is then the tag of a row; Scale, Min, Max and '
                              'Station of the row apply')
     parser.add_argument('--yes', action='store_true',
