@@ -47,6 +47,9 @@ DISCOVERY_UNIT = DEPLOY / 'abdf1-discovery@.service'
 PATH = f'{Path(sys.executable).parent}:{os.environ["PATH"]}'
 LIBRARIES = ':'.join(map(str, [Path(sys.prefix, 'lib'), *Path(sys.prefix).glob(
     'lib/python*/site-packages/ros_rmw_fastrtps_cpp.libs')]))
+# What MemoryDenyWriteExecute asks the kernel for (PR_SET_MDWE, from Linux 6.3 on).
+DENY_WRITE_EXECUTE = 'import ctypes, os, sys; ctypes.CDLL(None).prctl(65, 1, 0, 0, 0); ' \
+    'os.execvp(sys.argv[1], sys.argv[1:])'
 RULES = DEPLOY / '99-abdf1.rules'
 DOCKERFILE = DEPLOY / 'Dockerfile'
 SETUP = (SOURCE / 'setup.py').read_text(encoding='utf-8')
@@ -170,7 +173,9 @@ def test_command_of_the_unit_starts_a_bridge_and_ends_by_its_signal(
              for word in shlex.split(start)]
     environment = os.environ | settings | {
         'ABDF1_INSTALL': str(install), 'ROS_LOG_DIR': str(tmp_path)}
-    with Observer() as observer, subprocess.Popen(words, env=environment) as process:
+    assert service['MemoryDenyWriteExecute'] == ['yes']
+    denied = [sys.executable, '-c', DENY_WRITE_EXECUTE, *words]
+    with Observer() as observer, subprocess.Popen(denied, env=environment) as process:
         try:
             line = '/press' if section == '/**' else section
             assert get_parameters(observer, 'stale_after', node=line) == [9.0]

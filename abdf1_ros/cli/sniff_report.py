@@ -99,7 +99,11 @@ class ReportBundle:
             self._processors[reply.src] = \
                 str(error) if self.is_anonymous else f'{reply.data.hex(" ")} ({error})'
             return
-        # An anonymous bundle leaves out the name of the program, which is in the status.
+        # An anonymous bundle leaves out the names of the program and of an unknown processor, both
+        # of which are in the status.
+        if self.is_anonymous and identity.plc_type is None and identity.name:
+            identity = replace(identity, model='unknown gateway' if identity.has_no_processor
+                               else 'unknown processor')
         who = str(identity).partition(' (')[0] if self.is_anonymous else str(identity)
         facts = [who, *identity.faults, *identity.remarks]
         if not self.is_anonymous:

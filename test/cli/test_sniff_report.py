@@ -183,7 +183,9 @@ def test_processor_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str],
     halted = told.data[:18] + b'\x5E\x20' + told.data[20:]
     said = [asked._replace(dst=4), told._replace(src=4, data=halted), asked, told,
             asked._replace(dst=5), told._replace(src=5, data=b'\xEE'),
-            asked._replace(dst=6), told._replace(src=6, data=b'\xEE\x34')]
+            asked._replace(dst=6), told._replace(src=6, data=b'\xEE\x34'),
+            asked._replace(dst=7), told._replace(src=7, data=b'\0\xEE\x34\x99\x41JDOES_PLC  '
+                                                 + told.data[16:])]
     for number, station in enumerate((9, told.src), 1):  # they refuse the question
         said.append(asked._replace(dst=station, tns=asked.tns + number))
         said.append(said[-1].reply(b'')._replace(sts=0x10))
@@ -197,16 +199,18 @@ def test_processor_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str],
         'station 1: SLC 5/04 series B revision 3, RUN',
         'station 4: SLC 5/04 series B revision 3, RUN; major error 0x0000, processor halted; '
         'forces installed', 'station 5: ee (a diagnostic status of 1 bytes)',
-        'station 6: unknown processor (EE 34)']
+        'station 6: unknown processor (EE 34)', 'station 7: JDOES_PLC series C revision 2']
     assert main([path, '--summary', '--report', str(report), '--anonymous']) == 0
     told = unpacked(report)['processors.txt']
-    assert 'EE' not in told.upper() and told.endswith('of 1 bytes\nstation 6: unknown processor\n')
+    assert 'EE' not in told.upper() and 'JDOE' not in told
+    assert told.endswith('of 1 bytes\nstation 6: unknown processor\n'
+                         'station 7: unknown processor series C revision 2\n')
     monkeypatch.setattr(sniff_report, 'MOST_ENTRIES', 1)
     assert main([path, '--summary', '--report', str(report)]) == 0
     files = unpacked(report)
     assert files['processors.txt'] == text
-    assert files['entries.txt'].strip().startswith('11.000000 <')
-    assert 'last of the recording; 11 before them are only' in files['README.txt']
+    assert files['entries.txt'].strip().startswith('13.000000 <')
+    assert 'last of the recording; 13 before them are only' in files['README.txt']
     capsys.readouterr()
 
 
