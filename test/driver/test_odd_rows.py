@@ -396,3 +396,27 @@ def test_station_whose_replies_are_all_damaged_is_told_so(mode: str) -> None:
     plc.fate = lambda data: Fate.PASSES
     bench.run(20.0)
     assert [bench.driver.points[row].error for row in GOOD] == [None, None]
+
+
+@pytest.mark.parametrize('mode', ['Message', 'Peer'])
+def test_heartbeat_that_is_never_confirmed_leaves_the_line_to_another_one(mode: str) -> None:
+    odd, good = (make_mapping(text, 'Heartbeat', plc='SLC', period=500)
+                 for text in ('N9:0', 'N12:0'))
+    plc = Plc(mode)
+    bench = DriverBench([*GOOD, odd, good], network=network(mode), far=plc)
+    bench.breathe()
+    bench.run(5.0)
+    assert plc.words[1, 9, 0] and plc.words[1, 12, 0]  # both count
+    plc.fate = of_files(Fate.DAMAGED, 9)
+    bench.run(15.0)
+    before = [len(bench.listener.times(row)) for row in GOOD]
+    beats = plc.words[1, 12, 0]
+    bench.run(40.0)
+    found = [len(bench.listener.times(row)) - count
+             for row, count in zip(GOOD, before, strict=True)]
+    assert min(found) >= 0.7 * 200
+    assert plc.words[1, 12, 0] - beats >= 0.7 * 80
+    plc.fate = lambda data: Fate.PASSES
+    count = plc.words[1, 9, 0]
+    bench.run(20.0)
+    assert plc.words[1, 9, 0] > count

@@ -188,6 +188,8 @@ class Plc:
             if was_lost and is_behind_gateway:
                 self.contact(now)
         elif claim.outcome is Outcome.UNKNOWN and claim.write is not None and claim.write.is_own:
+            if self._stations.odd.is_odd(key_of(claim.write.mapping, is_own=True)):
+                return  # only this row waits then
             self.failures += 1
             if self.is_lost:
                 took = self._record.line.took(claim.begun, now)
@@ -230,7 +232,8 @@ class Plc:
         if not odd.failed or row.is_first_try or self._conditions.is_ending:
             return -math.inf
         is_count = isinstance(row, HeartbeatRow) and not row.wants_zero
-        return odd.next_own(key_of(row.mapping, is_own=True), OTHERS_SHARE if is_count else 0)
+        is_shared = is_count or self._stations[self.station].has_gateway
+        return odd.next_own(key_of(row.mapping, is_own=True), OTHERS_SHARE if is_shared else 0)
 
     def _why_held(self) -> str:
         """Return why no heartbeat may count, empty if they may (rules 3 b, 5)."""
