@@ -205,8 +205,7 @@ def test_end_waits_for_a_port_that_was_lost_unless_it_was_left_or_is_of_a_spare(
         is_alive: bool, is_open: bool, is_released: bool, is_spare: bool, waits: bool) -> None:
     link = Mock(is_released=is_released, **{'is_alive.return_value': is_alive})
     link.state.is_open = is_open
-    surroundings = Mock(link=link)
-    session: Any = Mock(is_waiting=False, _surroundings=surroundings)
+    session: Any = Mock(is_waiting=False, _surroundings=Mock(link=link))
     session.configuration.parameters.standby = is_spare
     interlocks = session.driver.interlocks
     interlocks.has_to_wait.return_value = True
@@ -214,8 +213,8 @@ def test_end_waits_for_a_port_that_was_lost_unless_it_was_left_or_is_of_a_spare(
     assert interlocks.has_to_wait.call_args_list == [call(is_open=is_open, is_meant=bool)] * waits
     interlocks.unconfirmed.return_value, interlocks.not_repeated.return_value = ['beat'], ['speed']
     BridgeSession.tell_unconfirmed(session, 'ends')
-    logger = surroundings.node.get_logger()
-    assert [logger.error.call_count, logger.warning.call_count] == (
+    notes = session.events.notes
+    assert [notes.error.call_count, notes.warning.call_count] == (
         [0, 0] if is_spare and not is_open else [1, 1])
 
 
