@@ -25,7 +25,7 @@ from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.interlocks.fallback import Crowd
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ros.callbacks import AnsweringNode
-from abdf1_ros.ros.topics.publishers import count_publishers, UNKNOWN
+from abdf1_ros.ros.topics.publishers import count_publishers, PublisherWatch, UNKNOWN
 from abdf1_ros.ros.topics.writes import LossCounter, WriteTopics
 from abdf1_ros.settings.heartbeats import Fallback
 from abdf1_ros.settings.mapping import Mapping
@@ -285,3 +285,16 @@ def test_remapped_topic_has_the_publishers_of_its_new_name() -> None:
             observer.node.create_publisher(Int16MultiArray, '/cell/door', 1)
         observer.node.create_publisher(Int16MultiArray, '/cell/line/write/b', 1)
         assert [count_publishers(node, topic) for topic in ('a', 'b')] == [2, 1]
+        told: list[Crowd] = []
+        watches = [PublisherWatch(node, Int16MultiArray, topic, told.append, told.append)
+                   for topic in ('b', 'a')]
+
+        def has_names() -> bool:
+            watches[1].living.ask_names_again()
+            return bool(told) and UNKNOWN not in told[-1].why
+
+        observer.until(has_names, 'a crowd of the first (28)')
+        assert told[-1].why == 'more than one publisher: /observer, /observer'
+        for watch in watches:
+            watch.end()
+        assert [math.isinf(crowd.until) for crowd in told[-2:]] == [True, False]

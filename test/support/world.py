@@ -53,6 +53,7 @@ from abdf1_ros.df1.slave import HalfDuplexSlave
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.guest_rules import ShareAccess
 from abdf1_ros.driver.guests import Guest, GuestCommand
+from abdf1_ros.driver.interlocks.fallback import Crowd
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import WriteResult
 from abdf1_ros.driver.writes.ages import Ages, HostClock, most_ahead
@@ -184,7 +185,8 @@ class Plant:
 
             fallback = Fallback((SAFE,), self.after)
             for number in range(self.rows):
-                add(f'N7:{number}', 'Write', f'w{number}', fallback=fallback)
+                add(f'N7:{number}', 'Write', f'w{number}', fallback=fallback,
+                    single_publisher=True)
             add(FREE, 'Write', 'free')
             needed = (f'w0_{station}',) if self.requires else ()
             add(BEAT, 'Heartbeat', 'beat', period=self.period,
@@ -455,10 +457,9 @@ class World(DriverBench):
         self.dice = Random(seed)
         # Killed or replaced so far; the number of the first driver of this process.
         self.drivers = self.process = 0
-        self.killed_at = 0.0
         self._killed: list[Driver] = []
         self.others: dict[int, OtherBridge] = {}  # by the station of the PLC
-        self.opened = 0.0  # when the port was last
+        self.killed_at = self.opened = 0.0  # when a driver, and the port, were last
         self.ended = self._dead_until = -math.inf  # when an orderly end began last; after a kill
         rows = change(plant.mappings())
         settings = DriverSettings(
@@ -478,6 +479,8 @@ class World(DriverBench):
         self.asked_at, self.said = dict[int, float](), bytearray()
         self.came: dict[str, float] = {}  # when a message of a row came last
         self.youngest: dict[str, float] = {}  # when the last of a row was published
+        # When a second publisher of a row came and went, infinite until it goes.
+        self.crowds: dict[str, list[tuple[float, float]]] = {}
         self.gaps: dict[str, float] = {}  # from when the topic was missing last that is required
         self.clocks = Clocks(plant.write_timeout, self.messages, rows)
         self.is_alive = True  # the executor
@@ -785,11 +788,32 @@ class World(DriverBench):
             self.clocks.counted.append((row.tag, self.published[key], now - age))
         self.published[key] = now - age
         missing = self.youngest.get(row.tag, 0.0) + (self.plant.requires or 0) / 1000
-        if now - age > missing:
-            self.gaps[row.tag] = missing
-        self.youngest[row.tag] = max(now - age, self.youngest.get(row.tag, -math.inf))
+        if not any(now - age <= until for _, until in self.crowds.get(row.tag, ())):
+            if now - age > missing:
+                self.gaps[row.tag] = missing
+            self.youngest[row.tag] = max(now - age, self.youngest.get(row.tag, -math.inf))
         self.driver.write([row], [value], now - age)
         self.line.wake(self.driver.machine)
+
+    def crowd(self, row: Mapping, *, is_told: bool = True) -> None:
+        """Let a second one publish on the topic of a row, too; the link is woken if it is told."""
+        self.crowds.setdefault(row.tag, []).append((self.line.now, math.inf))
+        self._set_crowd(row.tag, math.inf)
+        if is_told:
+            self.line.wake(self.driver.machine)
+
+    def part(self) -> None:
+        """Let nobody publish beside another one any more."""
+        for tag, spans in self.crowds.items():
+            begun, until = spans[-1]
+            if until == math.inf:
+                spans[-1] = begun, self.line.now
+                self._set_crowd(tag, self.line.now)
+        self.line.wake(self.driver.machine)
+
+    def _set_crowd(self, tag: str, until: float) -> None:
+        crowd = Crowd('more than one publisher', until)
+        self.driver.interlocks.crowd(self.rows[tag].topic, crowd)
 
     def ask(self, station: int, text: str) -> None:
         """Let a guest write a value of its own to a word, of all stations, or what none knows."""
@@ -959,6 +983,7 @@ class World(DriverBench):
             self.fall_silent(station, False)
             watched.refuses = watched.refuses_messages = watched.swallows_replies = False
             watched.set_mode(Setting.RUN, self.line.now)
+        self.part()
         self.is_alive, self.is_queued = True, False
         if self.is_deaf:
             self.heard_again = self.line.now

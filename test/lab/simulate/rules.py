@@ -603,10 +603,46 @@ class OneResult(Rule):
         if result.outcome is not Outcome.FALLBACK or result.mapping.serves:
             return
         world, tag, station = self.world, result.mapping.tag, result.mapping.station
+        crowd, _ = world.crowds.get(tag, [(0.0, 0.0)])[-1]
         reason = max(world.came.get(tag, 0.0), world.ill[station], world.ill[0], world.opened,
-                     world.ended, self._late[station], world.plcs[station].ran_again + MODE_PERIOD)
+                     world.ended, crowd, self._late[station],
+                     world.plcs[station].ran_again + MODE_PERIOD)
         before, self._told[tag] = self._told[tag], world.line.now
         self.demand(before - self._spared - self.held <= reason, tag, 'was told at', before)
+
+
+class Crowds(Rule):
+    text = 'beside another publisher no message is sent, and its output falls back at once (28)'
+
+    def __init__(self, world: World) -> None:
+        super().__init__(world)
+        self._late: defaultdict[str, float] = defaultdict(lambda: -math.inf)
+
+    def sent(self, entry: Sent) -> None:
+        published = self.world.published.get((entry.tag, entry.value), -math.inf)
+        for begun, until in self.world.crowds.get(entry.tag, ()):
+            self.demand(published > until or entry.is_again or entry.when < begun + self.lag
+                        or entry.value in (SAFE, *GUESTS),
+                        entry, 'was published at', published, 'before the end of', begun, until)
+
+    def executed(self, entry: Executed) -> None:
+        if entry.is_late or entry.value in GUESTS:
+            self._late[entry.tag] = entry.when
+
+    def stand(self) -> None:
+        world = self.world
+        for tag, spans in world.crowds.items():
+            bound, station, (begun, until) = world.bounds[tag], world.rows[tag].station, spans[-1]
+            if bound is None or until < math.inf or world.plant.is_read_only:
+                continue
+            watched = world.plcs[station]
+            limit = bound - world.plant.after / 1000 + STEP
+            calm = max(begun, world.ill[station], world.ill[0], self._late[tag] + world.held_for,
+                       max(watched.brought, world.overwritten.get(tag, 0.0)) + MODE_PERIOD
+                       + _REWRITTEN)
+            value = watched.word(watched.places[tag])
+            self.demand(value == SAFE or world.line.now < calm + limit, tag, value, 'since',
+                        begun)
 
 
 class Probes(Rule):
@@ -976,9 +1012,8 @@ class OneOwner(Rule):
 
 RULES: tuple[type[Rule], ...] = (
     Results, Ages, Stamps, Turns, Values, Guards, Withheld, Beats, BeatsAfterFallbacks, Order,
-    Outputs, OneResult, Probes, Unheard, Queued, AfterRun, Held, ReadOnly, Guests, GuestAges,
-    OnTheWire, View, Fresh, Served, Rungs, Answers, ReadBack, Repeats, Taken,
-    Foreign)
+    Outputs, OneResult, Crowds, Probes, Unheard, Queued, AfterRun, Held, ReadOnly, Guests,
+    GuestAges, OnTheWire, View, Fresh, Served, Rungs, Answers, ReadBack, Repeats, Taken, Foreign)
 
 
 class Judge:

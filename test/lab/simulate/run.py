@@ -400,6 +400,20 @@ def _other_bridge(story: Story, station: int) -> None:
         world.add_bridge(station)
 
 
+def _crowd(story: Story, station: int) -> None:
+    """Let a second one publish on a topic that should have one, for a while or for a moment."""
+    world = story.world
+    story.publish_much()
+    story.wait(1.0)
+    row = story.dice.choice(world.rows_of(station))
+    if story.dice.random() < 0.3:
+        world.crowd(row, is_told=False)
+        world.part()
+    else:
+        world.crowd(row)
+        story.wait(story.longest_bound())
+
+
 def _odd_device(story: Story, station: int) -> None:
     """Let the PLCs behave like a device that somebody has met."""
     mode = {'Gateway': 'Message', 'Standard gateway': 'Standard'}.get(
@@ -428,7 +442,8 @@ def _odd_rows(story: Story, station: int) -> None:
 
 _NO_EXCUSE, _QUEUED, _NEW_FILES = 'messages refused', 'queued', 'new files'
 # Which excuse nothing.
-_EXPECTED = ('guest', 'gateway holds', 'another network', 'frames lost', 'odd rows')
+_EXPECTED = (
+    'guest', 'gateway holds', 'another network', 'frames lost', 'odd rows', 'two publishers')
 _TROUBLES: dict[str, Callable[[Story, int], None]] = {
     'noise': _noise, 'silence': _silence, 'refusal': _refusal,
     _NO_EXCUSE: _refused_messages, 'replies lost': _lost_replies,
@@ -438,7 +453,7 @@ _TROUBLES: dict[str, Callable[[Story, int], None]] = {
     'other writer': _other_writer, 'other bridge': _other_bridge, 'guest': _guest,
     'gateway holds': _gateway_holds, 'frames lost': _lost_frames, 'another network': _overwritten,
     'receive wire broken': _broken_wire, _NEW_FILES: _new_files, _QUEUED: _queued,
-    'odd device': _odd_device, 'odd rows': _odd_rows}
+    'odd device': _odd_device, 'odd rows': _odd_rows, 'two publishers': _crowd}
 
 
 @dataclass(slots=True)
