@@ -23,8 +23,9 @@ from types import SimpleNamespace
 from typing import cast
 
 from abdf1_ros.driver.interlocks.fallback import Crowd
+from abdf1_ros.ros.diagnostics.graph import UNKNOWN_NODE
 from abdf1_ros.ros.topics.interlocks import InterlockWatch
-from abdf1_ros.ros.topics.publishers import LivingPublishers, UNKNOWN
+from abdf1_ros.ros.topics.publishers import LivingPublishers
 from abdf1_ros.settings.heartbeats import Fallback
 import pytest
 from rclpy.duration import Duration
@@ -123,15 +124,15 @@ def test_rule_28_publisher_that_came_and_went_between_two_looks_is_a_crowd_for_a
 
 def test_rule_28_crowd_is_told_whatever_rclpy_knows_of_names() -> None:
     topic = Topic()
-    topic.names = ['/a', f'/{UNKNOWN}']
+    topic.names = ['/a', UNKNOWN_NODE]
     topic.come(2)
     topic.names = ['/a', '/b']
     for _ in range(2):
         topic.living.ask_names_again()
-    assert [crowd.why[25:] for crowd in topic.told] == [f'/a, /{UNKNOWN}', '/a, /b']
+    assert [crowd.why[25:] for crowd in topic.told] == [f'/a, {UNKNOWN_NODE}', '/a, /b']
     topic.names = None  # type: ignore[assignment]  # it fails
     topic.come()
-    assert topic.told[-1] == Crowd(f'more than one publisher: {UNKNOWN}')
+    assert topic.told[-1] == Crowd(f'more than one publisher: {UNKNOWN_NODE}')
     topic.living.end()
     assert not topic.is_crowded() and topic.living.alive == 0
 
@@ -166,12 +167,12 @@ def test_rule_28_log_has_the_names_when_they_are_known_and_rule_17_says_nothing(
     assert (watch.look(0.0), watch.refusing(0.0)) == (('other',), {})
     interlocks.crowd('speed', Crowd('two'))
     assert watch.refusing(1.0) == {'speed': '/a, /b'}
-    graph.names[0] = UNKNOWN
+    graph.names[0] = '_NODE_NAME_UNKNOWN_'
     interlocks.crowd('speed', Crowd('two', 1.5))
     assert watch.refusing(2.0) == {}
     interlocks.crowd('speed', Crowd('two'))
     assert [watch.refusing(now) for now in (3.0, 3.9, 4.0)] == [
-        {}, {}, {'speed': f'/{UNKNOWN}, /a'}]
+        {}, {}, {'speed': f'/a, {UNKNOWN_NODE}'}]
 
 
 class Cell(ros.BridgeCell):

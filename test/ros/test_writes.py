@@ -25,7 +25,8 @@ from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.interlocks.fallback import Crowd
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ros.callbacks import AnsweringNode
-from abdf1_ros.ros.topics.publishers import count_publishers, PublisherWatch, UNKNOWN
+from abdf1_ros.ros.diagnostics.graph import UNKNOWN_NODE
+from abdf1_ros.ros.topics.publishers import count_publishers, PublisherWatch
 from abdf1_ros.ros.topics.writes import LossCounter, WriteTopics
 from abdf1_ros.settings.heartbeats import Fallback
 from abdf1_ros.settings.mapping import Mapping
@@ -68,7 +69,7 @@ class Taker:
         self.kinds: dict[str, type] = {}
         self.wakes: list[int] = []
         self.events: Any = None  # of a topic with Single_Publisher
-        self.interlocks, self.panel = self, 'panel'
+        self.interlocks, self.panel = self, 'panel_{}'
 
     def create_subscription(self, kind: Any, name: str, callback: Any, qos: Any,
                             event_callbacks: Any = None) -> str:
@@ -117,7 +118,7 @@ class Taker:
                 'received_timestamp': now - int(waited * 1e9)})
 
     def get_publishers_info_by_topic(self, name: str) -> list[Any]:
-        return [SimpleNamespace(node_namespace='/', node_name=f'{self.panel}_{name[-1]}',
+        return [SimpleNamespace(node_namespace='/', node_name=self.panel.format(name[-1]),
                                 qos_profile=QoSProfile(depth=1))]
 
     def lost(self, topic: str, count: int) -> None:
@@ -259,9 +260,9 @@ def test_rule_28_driver_that_has_the_line_is_told_who_publishes(
     single = partial(make_mapping, 'N7:0', 'Write', tag='a', single_publisher=True)
     node.mappings[0] = single()
     topics.give_to(node.open(topics))
-    node.panel = UNKNOWN
+    node.panel = '_NODE_NAME_UNKNOWN_'
     node.events.matched(SimpleNamespace(total_count=2, current_count=2))
-    node.panel = 'panel'
+    node.panel = 'panel_{}'
     node.publish('a', 1)
     new = Taker('a', 'b')
     new.mappings[0] = single()
@@ -270,7 +271,8 @@ def test_rule_28_driver_that_has_the_line_is_told_who_publishes(
     topics.give_to(opened)
     topics.withdraw()
     crowd = 'a: more than one publisher: /panel_a'
-    assert node.said == ['-a', crowd.replace('panel', UNKNOWN), crowd, 'a 1', 'a 2', '-b', '-a']
+    assert node.said == [
+        '-a', crowd.replace('/panel_a', UNKNOWN_NODE), crowd, 'a 1', 'a 2', '-b', '-a']
     assert new.said == [crowd, f'{crowd} until now']
     assert len(node.wakes) == 4 and len(new.wakes) == 2
 
@@ -291,7 +293,7 @@ def test_remapped_topic_has_the_publishers_of_its_new_name() -> None:
 
         def has_names() -> bool:
             watches[1].living.ask_names_again()
-            return bool(told) and UNKNOWN not in told[-1].why
+            return bool(told) and UNKNOWN_NODE not in told[-1].why
 
         observer.until(has_names, 'a crowd of the first (28)')
         assert told[-1].why == 'more than one publisher: /observer, /observer'

@@ -129,7 +129,7 @@ class Graph:
             ends = self._source.get_publishers_info_by_topic(topic)
         except UnicodeDecodeError:  # rclpy cannot read the name of one of them
             return ['a node whose name cannot be read']
-        return [*map(_node_of, ends)]
+        return [*map(node_of, ends)]
 
     def has_other(self, topic: str, kind: str, name: str) -> bool:
         """Tell whether a node other than ``name`` has this topic with this type now."""
@@ -138,10 +138,10 @@ class Graph:
                     *self._source.get_subscriptions_info_by_topic(topic)]
         except UnicodeDecodeError:  # rclpy cannot read the name of a node, so it is not ours
             return True
-        return any(end.topic_type == kind and _node_of(end) != name for end in ends)
+        return any(end.topic_type == kind and node_of(end) != name for end in ends)
 
 
-def _node_of(end: TopicEndpointInfo) -> str:
+def node_of(end: TopicEndpointInfo) -> str:
     """Return the full name of the node that has a publisher or subscriber."""
     return UNKNOWN_NODE if end.node_name == _UNKNOWN \
         else f'{end.node_namespace.rstrip("/")}/{end.node_name}'

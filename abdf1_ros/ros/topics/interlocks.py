@@ -24,7 +24,8 @@ import math
 
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.ports.clock import line_time
-from abdf1_ros.ros.topics.publishers import count_publishers, publisher_names, UNKNOWN
+from abdf1_ros.ros.diagnostics.graph import UNKNOWN_NODE
+from abdf1_ros.ros.topics.publishers import count_publishers, publisher_names
 from abdf1_ros.text import first
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
@@ -95,7 +96,7 @@ class InterlockWatch:
         self._refusing = {topic: self._refusing.get(topic, now) for topic in topics}
         names = {topic: publisher_names(self._node, topic) for topic in topics}
         return {topic: first(found) for topic, found in names.items()
-                if UNKNOWN not in ' '.join(found) or now >= self._refusing[topic] + _NAMES_COME}
+                if UNKNOWN_NODE not in found or now >= self._refusing[topic] + _NAMES_COME}
 
 
 def count_owners(node: Node, topic: str) -> int:

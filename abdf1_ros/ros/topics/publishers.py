@@ -34,6 +34,7 @@ from typing import Protocol
 
 from abdf1_ros.driver.interlocks.fallback import Crowd
 from abdf1_ros.ports.clock import line_time
+from abdf1_ros.ros.diagnostics.graph import node_of, UNKNOWN_NODE
 from abdf1_ros.ros.topics.messages import lease_qos, write_qos
 from abdf1_ros.settings.heartbeats import LONGEST_LEASE
 from abdf1_ros.text import first
@@ -43,9 +44,6 @@ from rclpy.node import Node
 from rclpy.subscription import Subscription
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 from rclpy.waitable import Waitable
-
-# The name of a node that rclpy does not know, mostly because its publisher has just come.
-UNKNOWN = '_NODE_NAME_UNKNOWN_'
 
 
 class Matched(Protocol):
@@ -107,7 +105,7 @@ class LivingPublishers:
 
     def ask_names_again(self) -> None:
         """Tell a crowd again if a name was unknown."""
-        if self.crowd is not None and UNKNOWN in self.crowd.why:
+        if self.crowd is not None and UNKNOWN_NODE in self.crowd.why:
             self._judge(self.alive)
 
     @property
@@ -132,7 +130,7 @@ class LivingPublishers:
         try:
             return first(self._names())
         except Exception:  # DDS may report a name that rclpy cannot read
-            return UNKNOWN
+            return UNKNOWN_NODE
 
 
 class _EventsOnly(ReentrantCallbackGroup):
@@ -193,8 +191,7 @@ def count_publishers(node: Node, topic: str) -> int:
 
 def publisher_names(node: Node, topic: str) -> list[str]:
     """Return the full names of the nodes that publish on a write topic, in their order."""
-    return sorted(f'{end.node_namespace.rstrip("/")}/{end.node_name}'
-                  for end in _publishers(node, topic))
+    return sorted(map(node_of, _publishers(node, topic)))
 
 
 def _publishers(node: Node, topic: str) -> list[TopicEndpointInfo]:
