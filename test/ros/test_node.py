@@ -578,30 +578,29 @@ def test_two_topics_that_remaps_give_one_name_are_told_at_the_start(
 
 
 @pytest.mark.parametrize(('arguments', 'expected'), [
-    (['--ros-args', '-r', '__node:=a-b'], 'a node name has letters, digits and underscores; '
-     "Failed to parse ROS arguments: Couldn't parse remap rule: '-r __node:=a-b'."),
+    (['--ros-args', '-r', '__node:=a-b'], 'a node name has letters, digits and underscores; '),
     (['--ros-args', '-p', 'net_file=net.csv'], 'a parameter is NAME:=VALUE, with a colon; '),
-    (['--ros-args', 'net_file:=x'], "-p is missing before ['net_file:=x']"),
+    (['--ros-args', 'net_file:=x'], '-p is missing before '),
     (['--ros-args', '-p', 'net.share:=[pty:/tmp/a]'],
      'put quotes around a text with [ or :; '),
-    (['--ros-args', '--help'], "write this before --ros-args: ['--help']"),
+    (['--ros-args', '--help'], 'write this before --ros-args: '),
     (['--ros-args', '-r', '__ns:=cell'], 'a namespace begins with "/"; '),
     (['--ros-args', '-r', '__ns:=/cell//x'], 'a namespace has names of letters, digits and '
      'underscores, each after one "/"; '),
-    (['--ros-args', '__ns:=/cell'], "-r is missing before ['__ns:=/cell']"),
-    (['--ros-args', '-p'], "Couldn't parse trailing -p flag."),
-    (['--ros-args', '--bogus'], '--bogus'),
-    (['--ros-args', '-r', f'__ns:=/{240 * "n"}'], "length should not exceed '255U - 8U'"),
-    (['--ros-args', '-r', f'__ns:=/{300 * "n"}'], 'invalid node namespace: unknown result code'),
-    (['--ros-args', '-r', f'__node:={256 * "n"}'], "node name length should not exceed '255'")],
+    (['--ros-args', '__ns:=/cell'], '-r is missing before '),
+    (['--ros-args', '-p'], ''),
+    (['--ros-args', '--bogus'], ''),
+    (['--ros-args', '-r', f'__ns:=/{240 * "n"}'], ''),
+    (['--ros-args', '-r', f'__ns:=/{300 * "n"}'], ''),
+    (['--ros-args', '-r', f'__node:={256 * "n"}'], '')],
     ids=['remap', 'colon', 'bare', 'list', 'help', 'namespace', 'slashes', 'bare_name',
          'parameter', 'unknown', 'topic', 'long', 'name'])
 def test_unusable_arguments_are_told_in_one_line(
         refusal: Callable[..., list[str]], arguments: list[str], expected: str) -> None:
+    """What follows our words is a text of rcl, which differs between versions of ROS."""
     lines = refusal(*arguments)
     (line,) = [line for line in lines if line.startswith('abdf1: ')]
-    assert line.startswith('abdf1: bad arguments: ')
-    assert expected in line
+    assert line.startswith(f'abdf1: bad arguments: {expected}')
     assert 'Traceback' not in ' '.join(lines)
 
 
