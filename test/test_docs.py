@@ -142,6 +142,17 @@ def test_nodes_that_pages_name_exist(name: str) -> None:
             assert set(entry.split(', ')) <= NODES, line
 
 
+def test_names_of_rclpy_for_consumers_are_those_of_the_example() -> None:
+    example = (ROOT / 'examples' / 'interlock_consumer.py').read_text('utf-8')
+    page = documents.text('docs/tutorials/interlocks.md')
+    rows = re.search(r'^\| it \| rclpy .*?\n\n', page, re.MULTILINE | re.DOTALL)
+    assert rows is not None
+    names = [name for row in rows[0].strip().splitlines()[2:]
+             for name in re.findall(r'`(\w+)`', row.split('|')[2])]
+    assert len(names) > 10
+    assert [name for name in names if not re.search(rf'\b{name}\b', example)] == []
+
+
 @for_all('name', documents.NAMES)
 def test_defaults_that_pages_quote_are_right(name: str) -> None:
     defaults = {entry.name: entry.default for entry in fields(Parameters)}
