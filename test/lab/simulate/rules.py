@@ -482,11 +482,14 @@ class BeatsAfterFallbacks(Rule):
         self._holds: dict[str, Executed] = {}  # what came last of ours
 
     def executed(self, entry: Executed) -> None:
-        if entry.is_late or entry.tag[0] != 'w':
+        if entry.tag[0] != 'w':
             return
         if entry.value not in GUESTS:
             self._over.pop(entry.tag, None)
-            self._holds[entry.tag] = entry
+            if not entry.is_late:
+                self._holds[entry.tag] = entry
+        elif entry.is_late:
+            return
         elif entry.before == SAFE:
             self._over[entry.tag] = entry.when
 
