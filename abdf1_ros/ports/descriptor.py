@@ -109,6 +109,8 @@ class PortAround:
 class DescriptorPort:
     """A port with a file descriptor, which is set to non-blocking; ``close`` closes it."""
 
+    no_bytes = 'the other end has closed the connection'  # why none come though the port is ready
+
     def __init__(self, descriptor: int, close: Callable[[], None]) -> None:
         self._descriptor = descriptor
         self._close = close
@@ -138,7 +140,7 @@ class DescriptorPort:
             return b''
         self.has_more = len(data) == READ_SIZE
         if not data:
-            raise OSError('the other end has closed the connection')
+            raise OSError(self.no_bytes)
         return data
 
     def fileno(self) -> int:

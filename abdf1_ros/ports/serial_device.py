@@ -36,6 +36,7 @@ from abdf1_ros.df1.frames import Damaged
 from abdf1_ros.line_names import device_of, number_of
 from abdf1_ros.ports.descriptor import DescriptorPort, NO_DATA_TAKEN, WRITE_TIMEOUT
 from abdf1_ros.ports.ownership import BUSY, own
+from abdf1_ros.ports.repeated_ends import has_often_ended, OFTEN
 from abdf1_ros.ports.settings import Lack, PortSettings
 import serial
 from serial.serialutil import SerialException  # another package named serial lacks it
@@ -65,6 +66,11 @@ _LOOK = 0.005
 
 # Interval (s) at which we check whether another program has changed the settings.
 SETTINGS_LOOK = 1.0
+
+# Why an adapter comes and goes.
+_ENDS_CAUSE = (
+    f'{OFTEN}: does its USB port sleep (autosuspend), has it too little power, do motors disturb '
+    'it, or does another program read the port?')
 
 # The byte that the system puts before a damaged character, and doubles if it is data (PARMRK).
 _MARK = 0xFF
@@ -105,12 +111,13 @@ def hold_device(settings: PortSettings, opened: Callable[[ExitStack], int],
         descriptor = opened(stack)
         if number_of(os.fstat(descriptor)) != number:
             raise OSError(f'{settings.name} leads to another device by now')
-        if not is_pseudo_terminal(settings.name):  # a pseudo-terminal lasts as long as its far end
+        name = '' if is_pseudo_terminal(settings.name) else settings.name
+        if name:  # a pseudo-terminal lasts as long as its far end
             fcntl.ioctl(descriptor, termios.TIOCEXCL)
         has_parity = settings.parity != 'None'
         if has_parity:
             mark_damage(descriptor)
-        return kind(descriptor, stack.pop_all().close, is_marked=has_parity)
+        return kind(descriptor, stack.pop_all().close, is_marked=has_parity, name=name)
 
 
 def _opened(settings: PortSettings) -> serial.Serial:
@@ -194,12 +201,16 @@ class SerialDevice(DescriptorPort):
     """
     A serial port; with ``is_marked`` a damaged character is returned alone, as ``Damaged``.
 
-    ``mark_damage`` lets the system make the marks.
+    ``mark_damage`` lets the system make the marks. ``name``: if it is given, the error of a lost
+    device names the usual causes if the device is lost again and again.
     """
 
+    no_bytes = 'the far end is gone, or another program reads the port too'
+
     def __init__(self, descriptor: int, close: Callable[[], None], *,
-                 is_marked: bool = False) -> None:
+                 is_marked: bool = False, name: str = '') -> None:
         super().__init__(descriptor, close)
+        self._name = name
         self._is_marked = is_marked
         self._held = b''  # the beginning of an incomplete mark
         self._pieces: deque[bytes] = deque()
@@ -237,8 +248,24 @@ class SerialDevice(DescriptorPort):
 
     def write(self, data: bytes) -> None:
         self.look()
-        super().write(data)
+        try:
+            super().write(data)
+        except OSError as error:
+            raise self._lost(error) from None
         self._written += len(data)
+
+    def _take(self) -> bytes:
+        try:
+            return super()._take()
+        except OSError as error:
+            raise self._lost(error) from None
+
+    def _lost(self, error: OSError) -> OSError:
+        """Record the loss of a device; return the error, with the usual causes if it repeats."""
+        text = error.strerror or str(error)
+        if text == NO_DATA_TAKEN or not self._name or not has_often_ended(self._name):
+            return error
+        return OSError(f'{text}, {_ENDS_CAUSE}')
 
     @property
     def has_pieces(self) -> bool:

@@ -24,15 +24,14 @@ section 3.5.2).
 
 from __future__ import annotations
 
-from collections import deque
 import errno
 import re
 import socket
-import time
 from urllib.parse import urlsplit
 
 from abdf1_ros.ports.descriptor import DescriptorPort
 from abdf1_ros.ports.ownership import OwnedConnection
+from abdf1_ros.ports.repeated_ends import has_often_ended, OFTEN
 from abdf1_ros.ports.settings import PortSettings
 
 # An attempt to connect ends after this time (s), so that we soon notice a repaired network.
@@ -48,15 +47,10 @@ _LOCAL_PORT_TAKEN = (errno.EADDRINUSE, errno.EADDRNOTAVAIL)
 # Our port of the last connection to each far address.
 _local_ports: dict[tuple[object, ...], int] = {}
 
-# If the server ends this number of connections within this time (s), they have a common cause.
-_MOST_ENDS, ENDS_PERIOD = 3, 10.0
 _ENDS_CAUSE = (
-    f'{_MOST_ENDS} times within {ENDS_PERIOD:.0f} s: another client has this line, or takes it '
+    f'{OFTEN}: another client has this line, or takes it '
     'each time (then let the device server refuse a second client), or the inactivity time of the '
     'server is too short')
-
-# By URL: the times (s) at which the server has ended our last connections.
-_ends: dict[str, deque[float]] = {}
 
 # How a telnet server begins: IAC, WILL to DONT, and the number of an option (RFC 854).
 _NEGOTIATION = re.compile(b'\xFF[\xFB-\xFE][\0-\x31]')
@@ -86,10 +80,7 @@ class ServerPort(DescriptorPort):
 
     def _ended(self, error: OSError) -> OSError:
         """Record the end of a connection; return the error, with the cause if it is known."""
-        ends = _ends.setdefault(self._url, deque(maxlen=_MOST_ENDS))
-        ends.append(time.monotonic())
-        if error.errno == errno.ETIMEDOUT or len(ends) < _MOST_ENDS or (
-                ends[-1] - ends[0] > ENDS_PERIOD):
+        if not has_often_ended(self._url) or error.errno == errno.ETIMEDOUT:
             return error
         return OSError(f'{error.strerror or error}, {_ENDS_CAUSE}')
 

@@ -19,6 +19,7 @@ from collections.abc import Callable
 from contextlib import ExitStack, suppress
 import errno
 import fcntl
+from functools import partial
 import os
 from pathlib import Path
 import stat
@@ -30,7 +31,7 @@ from typing import Any
 
 from abdf1_ros.df1.frames import Damaged
 from abdf1_ros.line_names import number_of
-from abdf1_ros.ports import listing, serial_device
+from abdf1_ros.ports import listing, repeated_ends, serial_device
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.ownership import own
 from abdf1_ros.ports.serial_device import hold_device, mark_damage, SerialDevice
@@ -67,6 +68,50 @@ def test_setting_that_the_device_does_not_have(pty: Pty) -> None:
     # A pty has no parity; the C library says so when there is nothing else to change.
     with pytest.raises(OSError, match='a pseudo-terminal has no parity'):
         open_port(PortSettings(str(pty.name), parity='Even'))
+
+
+GONE = 'the far end is gone, or another program reads the port too'
+OFTEN = (', 3 times within 10 s: does its USB port sleep (autosuspend), has it too little power, '
+         'do motors disturb it, or does another program read the port?')
+
+
+def loss_of(name: str, loses: str) -> str:
+    """Return the error of a device that is ready and has no bytes, or takes none."""
+    ours, theirs = os.pipe()
+    os.close(theirs if loses == 'read' else ours)
+    left = ours if loses == 'read' else theirs
+    port = SerialDevice(left, partial(os.close, left), name=name)
+    with pytest.raises(OSError) as caught:  # noqa: PT011
+        port.read(PATIENCE, left) if loses == 'read' else port.write(b'x')
+    port.close()
+    return caught.value.strerror or str(caught.value)
+
+
+def test_adapter_that_comes_and_goes_is_told_with_the_usual_causes(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    moments = iter([0.0, 0.5, 4.0, 9.0, 10.0, 30.0, 31.0])
+    monkeypatch.setattr(repeated_ends, 'time', SimpleNamespace(monotonic=lambda: next(moments)))
+    said = [loss_of(name, loses) for name, loses in (
+        ('/dev/gone1', 'read'), ('/dev/gone2', 'read'), ('/dev/gone1', 'write'),
+        ('/dev/gone1', 'read'), ('/dev/gone1', 'write'), ('/dev/gone1', 'read'),
+        ('/dev/gone1', 'read'))]
+    broken = os.strerror(errno.EPIPE)
+    assert said == [GONE, GONE, broken, GONE + OFTEN, broken + OFTEN, GONE, GONE]
+
+
+def test_pseudo_terminal_that_comes_and_goes_has_other_causes(pty: Pty) -> None:
+    for _ in range(4):
+        port = open_port(PortSettings(str(pty.name)))
+        with pytest.MonkeyPatch.context() as patch, pytest.raises(OSError, match='it is gone$'):
+            patch.setattr(os, 'write', raises(OSError(errno.EIO, 'it is gone')))
+            port.write(b'x')
+        port.close()
+
+
+def raises(error: Exception) -> Callable[..., int]:
+    def fail(*args: object) -> int:
+        raise error
+    return fail
 
 
 def told_by_open(settings: PortSettings) -> dict[str, str]:

@@ -23,7 +23,7 @@ import threading
 import time
 from unittest.mock import Mock
 
-from abdf1_ros.ports import rfc2217_port, socket_port
+from abdf1_ros.ports import repeated_ends, rfc2217_port
 from abdf1_ros.ports.descriptor import READ_SIZE
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.rfc2217_port import Rfc2217Port
@@ -146,7 +146,7 @@ def test_client_that_is_thrown_out_again_and_again_is_told_of_the_other_one(
     server, other = NewestClientServer(), NewestClientServer()
     said = []
     moments = Mock(side_effect=[0.0, 0.5, 1.0, 2.0, 11.0, 13.0, 14.0, 15.0, 16.0])  # of all ends
-    monkeypatch.setattr(socket_port, 'time', Mock(monotonic=moments))
+    monkeypatch.setattr(repeated_ends, 'time', Mock(monotonic=moments))
     for each in (server, other, *4 * [server]):
         port = open_port(PortSettings(each.url))
         assert port.read(PATIENCE, port.fileno()) == b'!'  # type: ignore[attr-defined]

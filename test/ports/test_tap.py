@@ -279,7 +279,7 @@ def test_lost_port_ends_it_with_an_error(
         ptys: list[Pty], monkeypatch: pytest.MonkeyPatch) -> None:
     with tap(ptys[0].name, ptys[1].name) as listening:
         ptys[1].close()
-        with pytest.raises(OSError, match='^(Input/output error|the other end has closed)'):
+        with pytest.raises(OSError, match='^(Input/output error|the far end is gone)'):
             list(listening.chunks(PATIENCE, PATIENCE, lambda: None))
     gone = BrokenPipeError(errno.EPIPE, 'it is gone')  # this error of stdout ends a program
     monkeypatch.setattr(DescriptorPort, 'read', Mock(side_effect=gone))
