@@ -488,9 +488,7 @@ class BeatsAfterFallbacks(Rule):
             self._over.pop(entry.tag, None)
             if not entry.is_late:
                 self._holds[entry.tag] = entry
-        elif entry.is_late:
-            return
-        elif entry.before == SAFE:
+        elif entry.before == SAFE and not entry.is_late:
             self._over[entry.tag] = entry.when
 
     def sent(self, entry: Sent) -> None:

@@ -45,8 +45,8 @@ def _walked(name: str, deviations: int) -> Walk:
     [*((name, 1) for name in SMALL), ('little end', 2), ('little gets', 2)]))
 def test_all_stories_keep_the_rules_and_reach_what_is_stored(name: str, deviations: int) -> None:
     walk = _walked(name, deviations)
-    reached = [f'{walk.stories} stories', *sorted(walk.reached)]
-    compare_stored(_STORED / f'{name} {deviations}.txt', '\n'.join(reached) + '\n')
+    reached = ''.join(f'{line}\n' for line in (f'{walk.stories} stories', *sorted(walk.reached)))
+    compare_stored(_STORED / f'{name} {deviations}.txt'.replace(' ', '_'), reached)
 
 
 @pytest.mark.parametrize(('name', 'text'), [
