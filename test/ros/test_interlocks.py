@@ -203,7 +203,10 @@ def test_rule_5_end_waits_for_a_port_that_was_lost_and_names_what_may_stand(
         if is_end:
             cell.end()
         else:
-            assert cell.call(SetBool, 'polling', SetBool.Request(data=False)).success
+            answer = cell.call(SetBool, 'polling', SetBool.Request(data=False))
+            assert answer.success
+            named = 'the port is closed before the PLC has confirmed: beat, speed'
+            assert answer.message.endswith(named) is not is_back
         assert cell.word('N10:1') == (7 if is_back else 42)
         assert (cell.word('N10:0') == 0) is is_back
     what = 'ends' if is_end else 'the port is closed'

@@ -63,8 +63,9 @@ class Recorder:
     def has_to_wait(self, is_meant: object) -> bool:
         return False
 
-    def tell_unconfirmed(self, what: str) -> None:
+    def tell_unconfirmed(self, what: str) -> list[str]:
         self._record(f'PLCs: {what}')
+        return []
 
     def close_line(self) -> None:
         self._record('close line')
@@ -212,8 +213,9 @@ def test_end_waits_for_a_port_that_was_lost_unless_it_was_left_or_is_of_a_spare(
     assert BridgeSession.has_to_wait(session, bool) is waits
     assert interlocks.has_to_wait.call_args_list == [call(is_open=is_open, is_meant=bool)] * waits
     interlocks.unconfirmed.return_value, interlocks.not_repeated.return_value = ['beat'], ['speed']
-    BridgeSession.tell_unconfirmed(session, 'ends')
+    told = BridgeSession.tell_unconfirmed(session, 'ends')
     notes = session.events.notes
+    assert len(told) == notes.error.call_count + notes.warning.call_count
     assert [notes.error.call_count, notes.warning.call_count] == (
         [0, 0] if is_spare and not is_open else [1, 1])
 

@@ -288,9 +288,10 @@ class BridgeNode(AnsweringNode):
             self.link.take()
             response.success, response.message = True, f'{self.session.port} is being opened'
         else:
-            tell_plcs([self.session], 'the port is closed', HAND_OVER)
+            told = tell_plcs([self.session], 'the port is closed', HAND_OVER)
             response.success = self.link.release()
-            response.message = f'{self.session.port}: {self.link.state.text}'
+            response.message = '; '.join(
+                (f'{self.session.port}: {self.link.state.text}', *told))
         return response
 
     def _reset_counters(self, request: Trigger.Request,

@@ -271,22 +271,24 @@ class BridgeSession:
         return link.is_alive() and (is_open or not is_gone) \
             and self.driver.interlocks.has_to_wait(is_open=is_open, is_meant=is_meant)
 
-    def tell_unconfirmed(self, what: str) -> None:
+    def tell_unconfirmed(self, what: str) -> list[str]:
         """
         Log the rows that the PLCs have not confirmed, and those that were not written again.
 
-        A spare without the line logs none: these rows belong to the bridge that has the line.
+        Return the same as texts. A spare without the line has none: these rows belong to the
+        bridge that has the line.
         """
         has_line = self._surroundings.link.state.is_open
         if self.is_waiting or self.configuration.parameters.standby and not has_line:
-            return
-        interlocks, notes = self.driver.interlocks, self.events.notes
+            return []
+        interlocks, notes, told = self.driver.interlocks, self.events.notes, list[str]()
         if tags := interlocks.unconfirmed(line_time()):
-            notes.error(f'rows as it {what}', (
-                f'{what} before the PLC has confirmed: {first(tags)}'))
+            told.append(f'{what} before the PLC has confirmed: {first(tags)}')
+            notes.error(f'rows as it {what}', told[-1])
         if tags := interlocks.not_repeated():
-            notes.warning(f'rows as it {what}', (
-                f'{what}; confirmed before, but not written again: {first(tags)}'))
+            told.append(f'{what}; confirmed before, but not written again: {first(tags)}')
+            notes.warning(f'rows as it {what}', told[-1])
+        return told
 
     def close_line(self) -> None:
         """Let the link end: all is written, or there is no time left."""
@@ -395,27 +397,29 @@ class BridgeSession:
 
 def tell_plcs(sessions: Sequence[BridgeSession], what: str, limit: float, *,
               is_meant: Callable[[Mapping], bool] = lambda mapping: True,
-              closes_lines: bool = False) -> None:
+              closes_lines: bool = False) -> list[str]:
     """
     Set heartbeats to 0 and write fallbacks in all sessions, and wait for all (rule 5).
 
-    The wait takes at most ``limit`` s. ``what``: what the bridge does next, for the log.
-    ``is_meant``: the rows for which a lost port is waited for. With ``closes_lines`` the link of
-    each session ends when its own end is over: no line waits for another.
+    Return what the log tells of rows that are not safe. The wait takes at most ``limit`` s.
+    ``what``: what the bridge does next, for the log. ``is_meant``: the rows for which a lost port
+    is waited for. With ``closes_lines`` the link of each session ends when its own end is over: no
+    line waits for another.
     """
     give_up = time.monotonic() + limit
     for session in sessions:
         session.begin_end()
-    left = [*sessions]
+    left, told = [*sessions], list[str]()
     while left:
         is_late = time.monotonic() >= give_up
         for session in [each for each in left if is_late or not each.has_to_wait(is_meant)]:
             left.remove(session)
-            session.tell_unconfirmed(what)
+            told += session.tell_unconfirmed(what)
             if closes_lines:
                 session.close_line()
         if left:
             time.sleep(_GLANCE)
+    return told
 
 
 def _about_files(configuration: Configuration) -> Iterator[tuple[LoggingSeverity, str]]:
