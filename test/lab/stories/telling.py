@@ -386,14 +386,16 @@ class Telling:
         look()
 
     def _demand_named(self) -> None:
-        """Demand that the end names each word that is not safe (5)."""
+        """Demand that the end names each word that is not safe; none if nothing was wrong (5)."""
         watched, interlocks = self.world.plcs[1], self.world.driver.interlocks
         named = {text.split(' ')[0] for text in (
             *interlocks.unconfirmed(self.world.line.now), *interlocks.not_repeated())}
+        is_well = self._ill_until == -math.inf
         for row in (*interlocks.fallbacks, *interlocks.heartbeats):
             tag = row.mapping.tag
             value = watched.word(str(row.mapping.address))
-            if value not in (0, SAFE) and tag not in named and not self._is_unknowable(tag):
+            is_told = tag in named and not is_well
+            if value not in (0, SAFE) and not is_told and not self._is_unknowable(tag):
                 raise Broken('Named', f'the end does not name {tag}, which holds {value} (5)',
                              self.world)
 
