@@ -964,10 +964,11 @@ class Foreign(Rule):
             found = _READ_VALUE.search(text)
             assert found is not None
             value = int(found[1])
-            late = [entry for entry in reversed(world.executed) if entry.tag.startswith('beat')
-                    and entry.is_late and entry.driver >= world.process
-                    and entry.when > when - _READ_BACK_WITHIN]
-            self.demand(value not in {entry.value for entry in late}, text, 'at', when, late)
+            last = next((entry for entry in reversed(world.executed) if entry.value == value
+                         and entry.tag.startswith(('beat', 'other'))), None)
+            is_ours = last is not None and last.tag.startswith('beat') and last.is_late \
+                and last.driver >= world.process and last.when > when - _READ_BACK_WITHIN
+            self.demand(not is_ours, text, 'at', when, last)
 
 
 class OneOwner(Rule):
