@@ -400,7 +400,8 @@ class Withheld(Rule):
                 begun = self._begun[row.station, world.drivers]
                 has_failed_since = point.withheld and point.error is not None
                 self.demand(self._read[row.tag] >= asked or point.is_withheld or has_failed_since
-                            or asked < begun + point.patience, row.tag, 'was read at', asked)
+                            or asked < max(begun + point.patience, world.killed_at),
+                            row.tag, 'was read at', asked)
         self._new.clear()
 
 
@@ -897,8 +898,11 @@ class View(Rule):
                 and (number, False) not in changes  # and back at once
             # A master answers in the name of a PLC that it takes for inactive.
             is_passed_on = world.master is None or world.master.stations[number].active
+            # Of a station none of whose reads passes, hardly anything shows that it answers.
+            passes = any(row.reads and row.tag not in world.odd_rows
+                         for row in world.rows.values() if row.station == number)
             is_well = now > max(world.ill[number], world.ill[0]) + self.flight \
-                and not world.holds and is_passed_on
+                and not world.holds and is_passed_on and passes
             self.demand(is_known or not is_well or number not in self._known,
                         world.driver.stations[number])
             if is_known and is_well:
