@@ -392,7 +392,9 @@ class Withheld(Rule):
 
     def stand(self) -> None:
         world = self.world
-        rows = world.rows.values() if self._new and not world.is_divided else ()
+        # With the port, blocks that were divided are joined again.
+        is_together = world.driver.is_online and not world.is_divided
+        rows = world.rows.values() if self._new and is_together else ()
         for row in rows:
             if row.is_guarded and row.station in self._new:
                 point, asked = world.driver.points[row], self._read[f'clock_{row.station}']
@@ -400,8 +402,7 @@ class Withheld(Rule):
                 begun = self._begun[row.station, world.drivers]
                 has_failed_since = point.withheld and point.error is not None
                 self.demand(self._read[row.tag] >= asked or point.is_withheld or has_failed_since
-                            or asked < max(begun + point.patience, world.killed_at),
-                            row.tag, 'was read at', asked)
+                            or asked < begun + point.patience, row.tag, 'was read at', asked)
         self._new.clear()
 
 
