@@ -157,11 +157,17 @@ def run(mode: str, plc: Plc, *rows: Mapping, settle: float = 30.0, seconds: floa
     """Return how often the good rows have values, once the line has found out what is odd."""
     bench = DriverBench([*GOOD, *rows], network=network(mode), far=plc, **others)
     bench.run(settle)
+    return bench, values_within(bench, seconds)
+
+
+def values_within(bench: DriverBench, seconds: float) -> list[int]:
+    """Let time pass; return how often the good rows have values, and keep only what came then."""
     before = [len(bench.listener.times(row)) for row in GOOD]
+    bench.listener.results.clear()
     bench.listener.changes.clear()
     bench.run(seconds)
-    return bench, [len(bench.listener.times(row)) - count
-                   for row, count in zip(GOOD, before, strict=True)]
+    return [len(bench.listener.times(row)) - count
+            for row, count in zip(GOOD, before, strict=True)]
 
 
 @LONG_MODES
@@ -285,12 +291,7 @@ def test_message_that_is_never_confirmed_takes_nothing_from_rows_and_messages(
 
     publish()
     bench.run(20.0)
-    before = [len(bench.listener.times(row)) for row in GOOD]
-    bench.listener.results.clear()
-    bench.listener.changes.clear()
-    bench.run(40.0)
-    found = [len(bench.listener.times(row)) - count
-             for row, count in zip(GOOD, before, strict=True)]
+    found = values_within(bench, 40.0)
     assert min(found) >= 0.8 * 200
     assert bench.listener.changes == []
     results = {row: [result for result in bench.listener.results if result.mapping is row]
@@ -333,12 +334,7 @@ def test_fallback_that_is_never_confirmed_leaves_the_line_to_others(
 
     publish()
     bench.run(20.0)
-    before = [len(bench.listener.times(row)) for row in GOOD]
-    bench.listener.changes.clear()
-    bench.listener.results.clear()
-    bench.run(40.0)
-    found = [len(bench.listener.times(row)) - count
-             for row, count in zip(GOOD, before, strict=True)]
+    found = values_within(bench, 40.0)
     tries = [when for when, data in plc.tried if when > 20.0 and file_of(data) == 9]
     assert bench.listener.changes == []
     assert tries and min(found) >= 40

@@ -15,8 +15,8 @@
 """
 Make each mistake of the simulation, and find a story that shows it.
 
-``find.py 1`` tells all stories with one deviation of the small scenes; it prints the story, or
-that there is none. Mistakes in what the stories leave out (values, other modes) are not found.
+``find.py`` tells all stories of the small scenes with one deviation; it prints the story, or that
+there is none. Mistakes in what the stories leave out (values, other modes) are not found.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def find(mistake: Mistake, deviations: int) -> tuple[str, Told] | None:
 def main() -> int:
     """Make each mistake; return the exit status."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
-    parser.add_argument('deviations', type=int, nargs='?', default=1)
+    parser.add_argument('--deviations', type=int, default=1, help='at most, in each story (1)')
     parser.add_argument('--only', default='', help='rules or texts that hold this')
     wanted = parser.parse_args()
     found = 0
