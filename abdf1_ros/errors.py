@@ -30,6 +30,10 @@ class Abdf1Error(Exception):
     about: str = ''
     done: str = ''
 
+    def __reduce__(self) -> tuple[object, ...]:
+        """Let pickle and copy keep args and attributes, whatever the constructor takes."""
+        return _made_again, (type(self), self.args), self.__dict__
+
     def words(self) -> str:
         """Return what is wrong."""
         return super().__str__()
@@ -37,6 +41,10 @@ class Abdf1Error(Exception):
     def __str__(self) -> str:
         """Return the subject and what is wrong with it."""
         return f'{self.about and self.about + ": "}{self.words()}{self.done}'
+
+
+def _made_again(kind: type[Abdf1Error], args: tuple[object, ...]) -> Abdf1Error:
+    return kind.__new__(kind, *args)
 
 
 class FormatError(Abdf1Error, ValueError):

@@ -14,6 +14,14 @@
 
 """What callers catch, the texts of the numbered messages, and how texts and numbers are shown."""
 
+from collections.abc import Iterator
+import copy
+from importlib import import_module
+from inspect import Parameter, signature
+import pickle
+from pkgutil import walk_packages
+
+import abdf1_ros
 from abdf1_ros import errors
 from abdf1_ros.counters import Counters, numbered
 from abdf1_ros.messages import Event, Message, Severity
@@ -47,6 +55,48 @@ def test_what_callers_can_catch() -> None:
     (errors.PortLost('unplugged'), 'port lost: unplugged')])
 def test_link_error_reads_as_its_numbered_text(error: errors.LinkError, text: str) -> None:
     assert str(error) == text
+
+
+def _exceptions() -> Iterator[type[Exception]]:
+    """Yield all exceptions that a program may meet; a command keeps its own to itself."""
+    for module in walk_packages(abdf1_ros.__path__, 'abdf1_ros.'):
+        if module.name.split('.')[1] not in ('cli', 'conform', 'testing', '__main__'):
+            yield from (kind for kind in vars(import_module(module.name)).values()
+                        if isinstance(kind, type) and issubclass(kind, Exception)
+                        and kind.__module__ == module.name)
+
+
+def _example(kind: type[Exception], value: int) -> Exception:
+    """Return an exception with an argument for each parameter; its type decides what it is."""
+    known = {'str': f'text {value}', 'int': value, 'int | None': value, 'bool': False,
+             'Place | str': Place('map.csv', value), 'tuple[object, ...]': (),
+             'Message | None': Message.ERR_COMMAND_TIMEOUT,
+             'list[Problem]': [Problem('a', f'{value}'), Problem(Place('b', 2), 'c')]}
+    if issubclass(kind, errors.LinkError) and '__init__' not in vars(kind):
+        places = 1 if 'words' in vars(kind) else kind.message.template.count('%')
+        return kind(*[value] * places, sent=False, cause=known['Message | None'])
+    try:
+        wanted = signature(kind).parameters.values()
+    except ValueError:  # the constructor of C takes anything
+        return kind(f'text {value}')
+    return kind(*[known[one.annotation] for one in wanted
+                  if one.kind is Parameter.POSITIONAL_OR_KEYWORD], **{
+        one.name: known[one.annotation] for one in wanted if one.kind is Parameter.KEYWORD_ONLY})
+
+
+def test_exceptions_survive_pickling_and_copies() -> None:
+    """In ``multiprocessing.Pool`` ``get`` waited for ever for an error that did not."""
+    kinds = {*_exceptions()}
+    assert kinds >= {errors.RemoteError, errors.PortLost, Problem, ConfigurationError}
+    for value, kind in enumerate(sorted(kinds, key=str)):
+        error = _example(kind, value)
+        if isinstance(error, errors.Abdf1Error):
+            error.about, error.done = 'N7:0 of station 1', '; 1 of 2 packets were written'
+        error.add_note('a note')
+        for again in (pickle.loads(pickle.dumps(error)), copy.copy(error)):  # noqa: S301
+            assert type(again) is kind
+            assert (str(again), again.args) == (str(error), error.args)
+            assert repr(vars(again)) == repr(vars(error))
 
 
 @for_all('error', [

@@ -39,9 +39,13 @@ class Refusal(Exception):
     """A command is answered with this STS (and EXT STS) instead of data."""
 
     def __init__(self, sts: int, ext_sts: int | None = None) -> None:
-        super().__init__(status.status_text(sts, ext_sts))
+        super().__init__(sts, ext_sts)
         self.sts = sts
         self.ext_sts = ext_sts
+
+    def __str__(self) -> str:
+        """Return the meaning of the codes."""
+        return status.status_text(self.sts, self.ext_sts)
 
 
 def extended(ext_sts: int) -> Refusal:

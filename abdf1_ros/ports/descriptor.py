@@ -42,8 +42,9 @@ NO_DATA_TAKEN = 'the line takes no data; is Handshake right?'
 class NoClient(OSError):
     """Our end of a line exists, but no program has opened the far end."""
 
-    def __init__(self) -> None:
-        super().__init__('waiting for a client')
+    def __str__(self) -> str:
+        """Return this text for every such error."""
+        return 'waiting for a client'
 
 
 class Port(Protocol):
