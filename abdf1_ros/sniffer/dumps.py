@@ -50,6 +50,8 @@ _XXD = re.compile(r'(?P<offset>[0-9a-f]{6,}): (?P<bytes>\S.*?)(?:  .*)?', re.IGN
 _HEXDUMP = re.compile(r'(?P<offset>[0-9a-f]{7,})  (?P<bytes>[0-9a-f ]+)(?:\|.*)?', re.IGNORECASE)
 _WORDS = re.compile(r'(?P<offset>[0-9a-f]{7,})(?P<words>(?: +[0-9a-f]{4}){1,8})?', re.IGNORECASE)
 _REPEATED = '*'
+# The head of "plc log" and "plc watch --csv", of any version, and of examples/recorder.py.
+_VALUES = re.compile('time,(station|topic),address,')
 # Bytes that a dump may leave out, all together: hours of the same byte on the fastest line.
 _MOST_LEFT_OUT = 100_000_000
 
@@ -98,6 +100,8 @@ class Recording:
         lines = self._lines()
         first = next(lines, '')
         lines = chain([first], lines)
+        if _VALUES.match(first):
+            raise Problem(f'{self._name}:1', 'values, not bytes: "plc plot" draws them')
         if is_capture_line(first):
             return read_capture(self._name, lines, self.settings)
         if _WORDS.fullmatch(first.strip()) and ' ' in first.strip():

@@ -134,6 +134,15 @@ def test_kinds_of_files_are_told_apart(tmp_path: Path) -> None:
         chunks(path, b'10 05\n\xe9\n')
 
 
+@pytest.mark.parametrize('head', [
+    'time,station,address,value', 'time,station,address,tag,value',
+    'time,station,address,tag,value,reason', 'time,topic,address,values'])
+def test_file_of_values_leads_to_the_program_that_draws_them(tmp_path: Path, head: str) -> None:
+    row = b'2026-03-01T14:05:09.000,1,N7:0,100501FF'  # a value that could be bytes
+    with pytest.raises(Problem, match='x:1: values, not bytes: "plc plot" draws them'):
+        chunks(tmp_path / 'x', head.encode() + b'\r\n' + row)
+
+
 def test_binary_of_any_size_is_read_whole(tmp_path: Path) -> None:
     assert b''.join(chunk.data for chunk in chunks(tmp_path / 'x', DATA * 100, True)) == DATA * 100
     recording = Recording(tmp_path / 'x', is_binary=True)
