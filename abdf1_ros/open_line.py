@@ -40,6 +40,7 @@ from abdf1_ros.pccc.dialect import Steps
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.processor import Processor
+from abdf1_ros.pccc.status import STS_ILLEGAL_COMMAND
 from abdf1_ros.pccc.values import Values, ValueType
 from abdf1_ros.ports.descriptor import Port
 from abdf1_ros.ports.link_thread import LinkThread
@@ -303,13 +304,18 @@ def kind_of(identify: Callable[[], Identity], cure: str,
     """
     Return family and processor of a station, from its own identity.
 
-    Raises FormatError, about the ``subject`` and with a ``cure``, if the family is unknown.
+    Raises FormatError, about the ``subject`` and with a ``cure``, if the family is unknown, and
+    RemoteError if the station refuses for a reason that may hold for all commands.
     """
     try:
         identity = identify()
     except RemoteError as error:
         if is_local_status(error.sts):
             raise
+        if error.sts != STS_ILLEGAL_COMMAND:
+            raise RemoteError(error.sts, error.ext_sts, (
+                f'{subject}does not identify itself: {error}. If this holds for no other command, '
+                f'{cure}')) from None
         raise FormatError(f'{subject}does not identify itself (STS {error.sts:02X} to the '
                           f'question); {cure}') from None
     if identity.plc_type is None:

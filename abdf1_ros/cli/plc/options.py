@@ -86,7 +86,8 @@ def add_stations_to_try(parser: argparse.ArgumentParser) -> None:
 
 
 def add_line(parser: argparse.ArgumentParser) -> None:
-    """Add the options of the line, and of a gateway."""
+    """Add the options of the line, and of a gateway; without ``add_plc_type`` no type is given."""
+    parser.set_defaults(plc_type=None)
     add_line_options(parser, LineDefaults())
     parser.add_argument('--via', metavar='N', type=_station, default=None,
                         help='half duplex: station of the gateway, if the PLC is behind a gateway')

@@ -75,6 +75,8 @@ def _files(options: argparse.Namespace, session: Session, mappings: Rows) -> int
             progress.clear()
             print(f'{str(entry):6} {_extent(entry)}', flush=True)
     progress.clear()
+    if not found and not options.map:
+        complain(f'station {options.station}: no file was found: the PLC refuses to read each')
     if options.map:
         faults = [*files.outside(found, rows)]
         which = '' if options.files is None else ' in these files'
