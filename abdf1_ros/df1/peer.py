@@ -327,6 +327,7 @@ class FullDuplexPeer(EqualNode):
             self._take_reply(packet)
         else:
             self._counters.commands_received += 1
+            self._stations[packet.src].in_vain = 0
             is_ours = self._settings.station in (None, packet.dst)
             self._counters.invalid_messages += not is_ours
             reply = self._serve(packet)
@@ -440,6 +441,8 @@ class FullDuplexPeer(EqualNode):
         overdue = [key for key, entry in self._outstanding.items() if self._given_up(entry) <= now]
         for key in overdue:
             entry = self._outstanding.pop(key)
+            self._stations[entry.task.command.dst].in_vain += \
+                entry.cause is None and not entry.is_hindered
             if entry.is_hindered and entry.cause is None:
                 self._accounting.hindered(entry.task)
             else:

@@ -30,6 +30,11 @@ MAX_STATION = 254
 # Number of commands in a row without a reply in time after which a station is treated as silent.
 MOST_OVERDUE = 2
 
+# Number of commands in a row that were acknowledged without a reply after which nothing asks a
+# station by itself. Each may cost an SLC with passthru one of its 30 buffers until it is switched
+# off (1747-RM001G 14-5), so no slower rate would do.
+MOST_IN_VAIN = 5
+
 # Number of times that a station may become active again without a reply to a command. After that,
 # a return does not end its outage.
 _MOST_RETURNS = 2
@@ -47,6 +52,8 @@ class Station:
     - ``overdue``: number of commands in a row that were delivered, not answered within
       Cmd_Timeout, and kept other commands waiting.
     - ``unanswered``: the same number, but it also counts commands that kept no others waiting.
+    - ``in_vain``: number of commands in a row, guests' ones included, that a full-duplex far end
+      has acknowledged without a reply of the station.
     - ``local_status``: STS of the last reply if a gateway sent it for the station; 0 if the
       station replied itself.
     - ``has_gateway``: it is or was behind a gateway, which may hold commands; False if unknown.
@@ -67,6 +74,7 @@ class Station:
     silent_since: float | None = None
     overdue: int = 0
     unanswered: int = 0
+    in_vain: int = 0
     local_status: int = 0
     has_gateway: bool = False
     replies_to_us: bool = False
@@ -82,6 +90,11 @@ class Station:
     def has_no_replies(self) -> bool:
         """Tell whether the last commands to it have had no reply in time."""
         return self.unanswered >= MOST_OVERDUE
+
+    @property
+    def is_left_alone(self) -> bool:
+        """Tell whether only writes and calls ask this station, which may be behind an SLC."""
+        return self.in_vain >= MOST_IN_VAIN and (self.has_gateway or not self.replies)
 
     @property
     def takes_no_commands(self) -> bool:
@@ -190,7 +203,7 @@ class ActiveStationList:
     def heard(self, number: int, now: float) -> None:
         """Record any answer: the station is active; if its gateway was not, all behind it are."""
         station = self.records[number]
-        station.last_heard = now
+        station.last_heard, station.in_vain = now, 0
         if station.active:
             return
         gateway = self.via(number)
@@ -249,6 +262,15 @@ class ActiveStationList:
         """Tell whether the link polls a station all the time, so that its return is seen."""
         gateway = self.via(number)
         return gateway in self._polled and (gateway == number or not self.records[gateway].active)
+
+    def may_be_asked(self, number: int) -> bool:
+        """Tell whether a read may ask a silent station whether it answers again."""
+        return not self.is_polled(number) and not self.records[number].is_left_alone
+
+    def ask_again(self, number: int) -> None:
+        """Let one more command ask a station that is left alone."""
+        station = self.records[number]
+        station.in_vain = min(station.in_vain, MOST_IN_VAIN - 1)
 
     def claim_message(self, number: int, now: float) -> bool:
         """Tell whether to send a message to a station; a silent station gets it as a due probe."""

@@ -285,6 +285,8 @@ class Checks:
     def _wanted_from(self, check: Check, probe_from: float, odd_from: float) -> float:
         """Return the clock value (s) from which a check that is due wants the line."""
         station = self._stations[check.station]
+        if station.is_left_alone:
+            return self._line.now + _AGAIN
         if not station.replies_in_time:
             return probe_from if station.active or check.kind is CheckKind.ECHO else math.inf
         if self._stations.odd.is_odd(check.key):
@@ -299,7 +301,8 @@ class Checks:
 
     def _add_request(self, station: int, now: float) -> None:
         check = Check(self, station, CheckKind.COUNTERS, math.inf, now)
-        if not self._stations[station].active:
+        record = self._stations[station]
+        if not record.active or record.is_left_alone:
             self._take_counters(station, {}, 'the station does not answer')
         elif not any(other.station == station and other.kind is CheckKind.COUNTERS
                      for other in self.jobs):

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 from abdf1_ros.df1.mode import LineMode
 from abdf1_ros.df1.odd import DAMAGED
-from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.df1.stations import ActiveStationList, MOST_IN_VAIN
 from abdf1_ros.errors import NoWholeReply
 from abdf1_ros.messages import Message
 
@@ -35,6 +35,7 @@ class Evidence:
       far end of a full-duplex line.
     - ``other_number``: the number to which its replies come in place of ours, None for ours.
     - ``fault``: what is wrong with its replies, None if none of them has come.
+    - ``is_left_alone``: nothing asks it by itself any more.
     - ``is_only_acknowledged``: its commands have had an ACK that is not its own, and no reply.
     """
 
@@ -43,6 +44,7 @@ class Evidence:
     has_own_ack: bool
     other_number: int | None
     fault: Message | None
+    is_left_alone: bool
     is_only_acknowledged: bool
 
     def __str__(self) -> str:
@@ -61,6 +63,11 @@ class Evidence:
             return (f'gateway {self.gateway} acknowledges commands to station {self.station}, and '
                     f'no reply comes: is the number right? "plc scan 0-63 --via {self.gateway}" '
                     'shows which stations reply')
+        if self.is_left_alone:
+            return (f'station {self.station} is not asked any more: {MOST_IN_VAIN} commands in a '
+                    'row were acknowledged and had no reply. Each may cost an SLC with passthru '
+                    'one of 30 buffers until it is switched off. A write, ~/read_now or a new '
+                    'start of the node asks again; is the number right?')
         return (f'commands to station {self.station} are acknowledged, and no reply comes: is the '
                 'number right? An SLC with passthru, or a gateway, acknowledges commands for all '
                 'stations; "plc scan 0-63" shows which stations reply')
@@ -72,7 +79,8 @@ def evidence_of(mode: LineMode, stations: ActiveStationList, number: int) -> Evi
     gateway = None if via == number else via
     has_own_ack = mode.is_master and gateway is None
     fault = station.unanswered_by if station.unanswered_by in DAMAGED else None
-    is_unanswered = fault is None and station.unanswered > 0 and not station.replies
+    is_alone = station.is_left_alone
+    is_unanswered = is_alone or fault is None and station.unanswered > 0 and not station.replies
     return Evidence(
         number, gateway, has_own_ack, stations.other_number(number), fault,
-        mode.waits_for_acks and not has_own_ack and is_unanswered)
+        is_alone, mode.waits_for_acks and not has_own_ack and is_unanswered)

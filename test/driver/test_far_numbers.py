@@ -15,6 +15,7 @@
 """Full duplex through a gateway that replies to its own number (M 6-4, 1747-UM005B 3-3)."""
 
 from collections.abc import Callable
+from unittest.mock import Mock
 
 from abdf1_ros.driver.evidence import evidence_of
 from abdf1_ros.driver.settings import DriverSettings
@@ -140,7 +141,7 @@ def test_acknowledgement_without_a_reply_is_told_as_what_it_is_in_full_duplex() 
     device.takes = silent_but_for(9)
     bench = bench_of(device, WORDS)
     assert told(bench) == ''
-    bench.run(5.0)
+    bench.run(3.0)
     assert told(bench) == (
         'commands to station 1 are acknowledged, and no reply comes: is the number right? An SLC '
         'with passthru, or a gateway, acknowledges commands for all stations; "plc scan 0-63" '
@@ -149,6 +150,91 @@ def test_acknowledgement_without_a_reply_is_told_as_what_it_is_in_full_duplex() 
     device.nodes = frozenset((PLC,))
     bench.run_until(lambda: bool(bench.listener.values(WORDS)), 20.0)
     assert told(bench) == ''
+
+
+def asked(device: OddDevice) -> int:
+    """Return the number of commands that have come to the station of WORDS."""
+    return device.asked.count(PLC)
+
+
+class Passthru(OddDevice):
+    """An SLC with passthru to Data Highway Plus, own node 9; other nodes may be off."""
+
+    def __init__(self, *on: int) -> None:
+        super().__init__(Wiring.FULL, station=9, nodes=(9, *on))
+        self.asked: list[int] = []
+        self.takes = self._take
+
+    def _take(self, data: bytes) -> Answer:
+        if not data[2] & 0x40:
+            self.asked.append(data[0])
+        return Answer.ACK if data[0] in self.nodes else Answer.LOSES
+
+
+OWN = make_mapping('N7:0', station=9, plc='SLC')
+
+
+@pytest.mark.parametrize('rows', [(WORDS,), (WORDS, OWN), (WORDS, TARGET, OWN)])
+def test_nothing_asks_a_node_that_has_left_five_commands_without_a_reply(
+        rows: tuple[Mapping, ...]) -> None:
+    """Each may cost one of 30 buffers of the SLC until its power is off (1747-RM001G 14-5)."""
+    device = Passthru()
+    bench = bench_of(device, *rows, processor_period=1.0)
+    bench.run(60.0)
+    assert device.asked.count(PLC) == 5
+    assert told(bench).startswith(
+        'station 1 is not asked any more: 5 commands in a row were acknowledged and had no reply.')
+    assert OWN not in rows or len(bench.listener.values(OWN)) > 40
+
+
+@pytest.mark.parametrize('ask', ['write', 'call', 'message of the node'])
+def test_node_that_is_left_alone_is_asked_again(ask: str) -> None:
+    device = Passthru(PLC)
+    bench = bench_of(device, WORDS, TARGET, OWN)
+    bench.run(2.0)
+    device.nodes = frozenset((9,))  # it goes off; later it is on again, and nobody sees it
+    bench.run(40.0)
+    device.nodes = frozenset((9, PLC))
+    bench.listener.reads.clear()
+    device.asked.clear()
+    bench.run(60.0)
+    assert (asked(device), bench.listener.values(WORDS)) == (0, [])
+    if ask == 'write':
+        bench.write(TARGET, [7], run=1.0)
+        assert bench.listener.outcomes() == [Outcome.WRITTEN]
+    elif ask == 'call':
+        bench.driver.read_now(WORDS, Mock())
+    else:
+        bench.at(bench.line.now, lambda: device.send(
+            bytes.fromhex('05 01 0f 00 01 00 a2 02 07 89 00 00')))
+    bench.run(10.0)
+    assert len(bench.listener.values(WORDS)) > 5 and told(bench) == ''
+
+
+def test_each_call_costs_a_node_that_is_left_alone_one_command() -> None:
+    bench = bench_of(device := Passthru(), WORDS, OWN)
+    bench.run(30.0)
+    device.asked.clear()
+    for _ in range(3):
+        bench.driver.read_now(WORDS, answer := Mock())
+        bench.run(10.0)
+        assert '2508' in answer.call_args[0][0].error
+    bench.driver.checks.request_counters(PLC)
+    bench.run(10.0)
+    assert asked(device) == 3
+    assert not bench.driver.checks.counters_wanted
+
+
+def test_plc_that_is_alone_and_has_replied_is_asked_for_ever() -> None:
+    device = Passthru(PLC)
+    bench = bench_of(device, WORDS)
+    bench.run(2.0)
+    device.nodes = frozenset((9,))
+    bench.run(60.0)
+    device.nodes = frozenset((9, PLC))
+    bench.listener.reads.clear()
+    bench.run(10.0)
+    assert len(bench.listener.values(WORDS)) > 5
 
 
 def test_acknowledgement_of_a_gateway_is_not_that_of_its_node() -> None:

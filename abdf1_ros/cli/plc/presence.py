@@ -29,6 +29,7 @@ from abdf1_ros.counters import Counters
 from abdf1_ros.df1.echo import COMES_BACK
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.packet import is_local_status
+from abdf1_ros.df1.stations import MOST_IN_VAIN
 from abdf1_ros.driver.evidence import Evidence, evidence_of
 from abdf1_ros.errors import (
     Abdf1Error,
@@ -161,9 +162,13 @@ def _basic_read() -> Steps[None]:
 
 def scan(network: Network, stations: Sequence[int], via: int | None = None,
          show: Callable[[str], None] = lambda text: None,
-         complain: Callable[[str], None] = lambda text: None) -> Iterator[Presence]:
+         complain: Callable[[str], None] = lambda text: None, *,
+         asks_all: bool = True) -> Iterator[Presence]:
     """
     Yield the presence of every station, ``via`` a gateway; raises OSError and PortLost.
+
+    In full duplex the scan ends, unless it ``asks_all``, after a number of stations in a row of
+    which only an ACK came.
 
     Silent stations are asked again at the end: a lost frame does not prove absence. ``show`` gets
     a text about the present station, ``complain`` the traffic if stations stay silent on a line
@@ -173,7 +178,7 @@ def scan(network: Network, stations: Sequence[int], via: int | None = None,
         network = replace(network, station=free_station(network.station, {*stations, via}))
     with Session(network, absent=stations, via=via) as session:
         left: Sequence[int] = stations
-        counters, has_lost = session.counters, False
+        counters, has_lost, in_vain = session.counters, False, 0
         for asked in range(1, _MOST_ROUNDS + 1):
             damaged, loses = counters.damaged_frames, False
             silent = []
@@ -183,8 +188,11 @@ def scan(network: Network, stations: Sequence[int], via: int | None = None,
                 presence = replace(look_at(session, station), asked=asked)
                 # Each command without a reply may cost an SLC with passthru one of its 30 buffers.
                 is_enough = presence.is_only_acknowledged and counters.damaged_frames == damaged
+                in_vain = in_vain + 1 if is_enough and network.line_mode.has_one_plc else 0
                 if presence.is_settled or is_enough:
                     yield presence
+                    if in_vain >= MOST_IN_VAIN and not asks_all:
+                        return
                     continue
                 silent.append(presence)
                 loses |= counters.chars_received > heard and not session.echoes

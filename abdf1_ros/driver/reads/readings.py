@@ -141,10 +141,11 @@ class Readings:
             self._want(demand, now)
 
     def _want(self, demand: ReadCall, now: float) -> None:
-        """Read a row at once for a call; a silent station's row is answered without a read."""
+        """Read a row at once for a call; for one of a silent station the answer is an error."""
         mapping = demand.mapping
         station = self._stations[mapping.station]
         if not station.replies_in_time:
+            self._stations.ask_again(mapping.station)
             demand.answer(ReadAnswer(error=str(
                 CommandTimeout() if station.active else StationInactive(station.number))))
             return

@@ -164,7 +164,7 @@ class Reads(WriteListener):
         if now < self._next_probe():
             return None
         station = next((number for number in self.aside
-                        if number not in busy and not self._stations.is_polled(number)), None)
+                        if number not in busy and self._stations.may_be_asked(number)), None)
         if station is None:
             return None
         jobs = self.aside.pop(station)
@@ -245,7 +245,7 @@ class Reads(WriteListener):
         due = self.queue.next_due()
         if self.odd:
             due = min(due, self._stations.odd.turns.next)
-        if all(map(self._stations.is_polled, self.aside)):
+        if not any(map(self._stations.may_be_asked, self.aside)):
             return due
         return min(due, self._next_probe())
 

@@ -294,6 +294,21 @@ def test_acknowledgement_of_an_slc_with_passthru_is_no_answer_of_a_station(
     assert asked == [8, 9, 10]  # each question without a reply may cost a buffer of the SLC
 
 
+@pytest.mark.parametrize(('options', 'last'), [((), 24), (('--all',), 40)])
+def test_scan_ends_after_five_stations_of_which_only_an_ack_came(
+        options: tuple[str, ...], last: int, tmp_path: Path,
+        capsys: pytest.CaptureFixture[str]) -> None:
+    device, asked = passthru(19), list[int]()
+    takes = device.takes
+    device.takes = lambda data: (asked.append(data[0]), takes(data))[1]
+    with odd_line(tmp_path / 'line', device) as name:
+        assert main(['scan', '17-40', '--peer', '--port', name, *options]) == 0
+    said = capsys.readouterr().out
+    assert asked == [*range(17, last + 1)]
+    assert ('16 stations were not asked' in said) == (not options)
+    assert f'1 of {len(asked)} stations answer; of {len(asked) - 1} only an ACK came' in said
+
+
 def test_acknowledgement_of_a_gateway_is_no_answer_of_its_node(tmp_path: Path) -> None:
     device = OddDevice(Wiring.HALF, 8, (9,))
     device.takes = lambda data: Answer.ACK if data[0] == 9 else Answer.LOSES

@@ -27,9 +27,15 @@ from abdf1_ros.cli.plc.line import MODES, network_of
 from abdf1_ros.cli.plc.options import add_line, stations_option
 from abdf1_ros.cli.plc.session import complain
 from abdf1_ros.cli.terminal import EXIT_FAILED, Progress
+from abdf1_ros.df1.stations import MOST_IN_VAIN
 
 _ONE_PLC_ANSWERS_TO_ALL = (
     'in full duplex most PLCs answer to every station number, so these may be one PLC')
+
+
+_LEFT_OUT = (
+    '{} stations were not asked: each command without a reply may cost an SLC with passthru one '
+    'of 30 buffers until it is switched off; --all asks them, too')
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -38,16 +44,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('stations', metavar='STATIONS', nargs='?', type=stations_option,
                         default=tuple(range(32)),
                         help='stations to ask, such as 1,5 or 0-254 (default: 0-31)')
+    parser.add_argument('--all', dest='asks_all', action='store_true', help=(
+        f'full duplex: go on after {MOST_IN_VAIN} stations in a row of which only an ACK came'))
 
 
 def run(options: argparse.Namespace) -> int:
     """Ask the stations, and print those that answer."""
     progress = Progress()
-    found = acknowledged = 0
+    found = acknowledged = count = 0
     asked = 1
     network = network_of(options)
     for there in presence.scan(
-            network, options.stations, options.via, progress.show, complain):
+            network, options.stations, options.via, progress.show, complain,
+            asks_all=options.asks_all):
+        count += 1
         if there.is_there:
             if not found:
                 print('station    answer  processor')
@@ -63,7 +73,9 @@ def run(options: argparse.Namespace) -> int:
             acknowledged += there.is_only_acknowledged
             asked = max(asked, there.asked)
     progress.clear()
-    print(presence.tally(found, len(options.stations), asked, acknowledged))
+    print(presence.tally(found, count, asked, acknowledged))
+    if count < len(options.stations):
+        print(_LEFT_OUT.format(len(options.stations) - count))
     if found > 1 and network.mode == MODES['full']:
         print(_ONE_PLC_ANSWERS_TO_ALL)
     return 0 if found else EXIT_FAILED
