@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 import time
 
 from abdf1_ros.cli.monitor.curves import Curve
-from abdf1_ros.cli.monitor.view import NodeView, Reading, ShownStatus, silence, Style
+from abdf1_ros.cli.monitor.view import NodeView, ShownStatus, silence, Style, TopicRow
 from abdf1_ros.errors import FormatError
 from abdf1_ros.ros.observer import graph_hint, ObservingNode
 from abdf1_ros.ros.topics.messages import latched_qos, MESSAGES
@@ -69,7 +69,7 @@ def full_name(text: str) -> str:
 class _Subscription:
     type_name: str
     handle: Subscription
-    reading: Reading
+    reading: TopicRow
 
 
 class Listening(ObservingNode):
@@ -178,7 +178,7 @@ class NodeWatch(Listening):
             handle = self.subscribe(_TYPES[type_name], topic, self._taker(topic), latched_qos())
             curve = None if type_name == _TEXT else Curve(is_bits=type_name == _BITS)
             known = _Subscription(
-                type_name, handle, Reading(topic.removeprefix(f'{self.name}/read/'), curve=curve))
+                type_name, handle, TopicRow(topic.removeprefix(f'{self.name}/read/'), curve=curve))
             self._subscriptions[topic] = known
         promised = None if deadline == Infinite else float(deadline.nanoseconds) / 1e9
         known.reading = replace(known.reading, promised=promised)

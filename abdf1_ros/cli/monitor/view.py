@@ -84,7 +84,7 @@ class TextLine:
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
+class TopicRow:
     """
     The last message of a read topic; ``values`` is None before the first.
 
@@ -172,7 +172,7 @@ class NodeView:
     is_there: bool
     told: float | None
     statuses: Sequence[ShownStatus]
-    readings: Sequence[Reading]
+    readings: Sequence[TopicRow]
     active: Sequence[int] | None
     results: Sequence[ShownStatus]
     hint: str = ''

@@ -21,7 +21,7 @@ from typing import Any
 
 from abdf1_ros.cli.monitor import view
 from abdf1_ros.cli.monitor.node import full_name, NodeWatch
-from abdf1_ros.cli.monitor.view import NodeView, Reading, Style
+from abdf1_ros.cli.monitor.view import NodeView, Style, TopicRow
 from abdf1_ros.errors import FormatError
 from abdf1_ros.ros.topics.messages import latched_qos, new_message, read_qos
 from abdf1_ros.settings.mapping import Mapping
@@ -91,7 +91,7 @@ def until(watch: NodeWatch, condition: Callable[[NodeView], object]) -> NodeView
     return watch.snapshot()
 
 
-def heard(picture: NodeView) -> dict[str, Reading]:
+def heard(picture: NodeView) -> dict[str, TopicRow]:
     return {reading.topic: reading for reading in picture.readings if reading.values is not None}
 
 

@@ -21,12 +21,12 @@ from abdf1_ros.cli.monitor.curves import WIDTH as CURVE_WIDTH
 from abdf1_ros.cli.monitor.view import (
     LINK_KEYS,
     NodeView,
-    Reading,
     render,
     show,
     ShownStatus,
     Style,
     TextLine,
+    TopicRow,
 )
 from abdf1_ros.text import BARS
 from hypothesis import given
@@ -42,7 +42,7 @@ def snapshot(**changes: object) -> NodeView:
     """Return a bridge of which nothing is wrong, changed as told."""
     fields: dict[str, object] = {
         'node': '/cell/abdf1', 'is_there': True, 'told': NOW - 0.4, 'statuses': [],
-        'readings': [Reading('speeds', [1200, -800], 'N7:0', NOW - 0.25, 0.5)],
+        'readings': [TopicRow('speeds', [1200, -800], 'N7:0', NOW - 0.25, 0.5)],
         'active': [1, 17], 'results': []}
     return NodeView(**fields | changes)  # type: ignore[arg-type]
 
@@ -72,8 +72,8 @@ def test_value_is_the_last_column_to_go() -> None:
     curve.take([1], NOW)
     picture = snapshot(
         statuses=[ShownStatus('link', Style.GOOD, 'OK', {'line load by topic': 'old 2.5%'})],
-        readings=[Reading('old', range(7, 13), 'N7:10/12', NOW - 5, 1.0, curve),
-                  Reading('new', None, promised=1.0)])
+        readings=[TopicRow('old', range(7, 13), 'N7:10/12', NOW - 5, 1.0, curve),
+                  TopicRow('new', None, promised=1.0)])
     assert lines(picture, 38)[2:4] == [
         '  old      5.0 s  STALE  7 and 5 more', '  new             no']
     shown = '  old      5.0 s  STALE  7 8 9 10 11 12'
@@ -88,11 +88,11 @@ def test_value_is_the_last_column_to_go() -> None:
         assert [lines(picture, each)[2] for each in (width - 1, width)] == [shown, row]
         assert lines(picture, width)[3].endswith(' no value')
         shown = row
-    long = Reading('a_topic_of_some_length', [1], received=NOW)
+    long = TopicRow('a_topic_of_some_length', [1], received=NOW)
     assert line_with('a_topic_of_some_l... ', snapshot(readings=[long]), 60).style is Style.PLAIN
     loads = ShownStatus('link', Style.GOOD, 'OK', {'line load by topic': f'{"x" * 40} 3.1%'})
     assert '3.1%' in line_with('xxx... ', snapshot(
-        statuses=[loads], readings=[Reading('x' * 40, [1], received=NOW)])).text
+        statuses=[loads], readings=[TopicRow('x' * 40, [1], received=NOW)])).text
 
 
 def test_every_part_can_be_found_by_its_first_line() -> None:
@@ -120,7 +120,7 @@ WITHHELD = [
 
 
 def test_verdict_values_and_what_is_wrong_fit_a_terminal_of_80_by_24_for_ten_rows() -> None:
-    rows = [Reading(f'row_{number}', [number, 7], f'N7:{number}', NOW - 0.1, 0.5, Curve())
+    rows = [TopicRow(f'row_{number}', [number, 7], f'N7:{number}', NOW - 0.1, 0.5, Curve())
             for number in range(10)]
     shown = lines(snapshot(statuses=WITHHELD, readings=rows), 79)[:23]
     assert shown[0] == '/cell/abdf1  ERROR (1 of 2): of 10 mappings 2 withheld'
@@ -137,7 +137,7 @@ def test_verdict_values_and_what_is_wrong_fit_a_terminal_of_80_by_24_for_ten_row
 
 def test_load_of_the_line_is_shown_by_row() -> None:
     picture = snapshot(statuses=WITHHELD, readings=[
-        Reading(f'row_{number}', [number], '', NOW, 0.5) for number in range(3)])
+        TopicRow(f'row_{number}', [number], '', NOW, 0.5) for number in range(3)])
     assert [line.split()[1:-1] for line in lines(picture) if 'row_' in line][:3] == [
         ['0.0', 's', 'fresh'], ['0.0', 's', 'fresh', '0.4%'], ['0.0', 's', 'fresh', '12.5%']]
 
@@ -146,7 +146,7 @@ def test_curve_stands_beside_its_value() -> None:
     curve = Curve()
     for second in range(20):
         curve.take([5, second], NOW - 19 + second)
-    reading = Reading('ramp', [5, 19], 'N7:0', NOW - 2, 1.5, curve)
+    reading = TopicRow('ramp', [5, 19], 'N7:0', NOW - 2, 1.5, curve)
     assert line_with('ramp', snapshot(readings=[reading])).text.endswith(
         f'  {curve.draw(NOW, 1.5)}  5 19')
     ascii_line = next(line.text for line in render(snapshot(readings=[reading]), NOW, 80, ASCII)
@@ -172,28 +172,29 @@ def test_verdict_is_the_worst_that_is_told(
 
 def test_value_that_does_not_come_here_is_in_the_verdict_though_the_bridge_is_content() -> None:
     good = [ShownStatus('mappings', Style.GOOD, 'OK: of 2 mappings 2 fresh')]
-    for reading in (Reading('a', [1], received=NOW - 5, promised=1.0), Reading('a', promised=1.0)):
-        told = lines(snapshot(statuses=good, readings=[reading, Reading('b', [1])]))
+    for reading in (TopicRow('a', [1], received=NOW - 5, promised=1.0),
+                    TopicRow('a', promised=1.0)):
+        told = lines(snapshot(statuses=good, readings=[reading, TopicRow('b', [1])]))
         assert told[0] == '/cell/abdf1  ERROR: topics: 1 of 2 topics without a fresh value here'
-    readings = [Reading('a'), Reading('empty', '', '', NOW, 1.0)]
+    readings = [TopicRow('a'), TopicRow('empty', '', '', NOW, 1.0)]
     assert lines(snapshot(statuses=good, readings=readings))[0].endswith('2 fresh')
 
 
 @for_all(('reading', 'state'), [
-    (Reading('a', [1], received=NOW - 0.5, promised=0.5), ('fresh', Style.GOOD)),
-    (Reading('a', [1], received=NOW - 0.51, promised=0.5), ('STALE (>0.5 s)', Style.BAD)),
-    (Reading('a', [1], received=NOW - 900, promised=None), ('any age', Style.PLAIN)),
-    (Reading('a', None, promised=0.5), ('no value', Style.BAD)),
-    (Reading('a', None, promised=None), ('no value', Style.BAD)),
+    (TopicRow('a', [1], received=NOW - 0.5, promised=0.5), ('fresh', Style.GOOD)),
+    (TopicRow('a', [1], received=NOW - 0.51, promised=0.5), ('STALE (>0.5 s)', Style.BAD)),
+    (TopicRow('a', [1], received=NOW - 900, promised=None), ('any age', Style.PLAIN)),
+    (TopicRow('a', None, promised=0.5), ('no value', Style.BAD)),
+    (TopicRow('a', None, promised=None), ('no value', Style.BAD)),
 ])
 def test_what_a_value_is_worth_comes_from_its_age_and_the_promise(
-        reading: Reading, state: tuple[str, Style]) -> None:
+        reading: TopicRow, state: tuple[str, Style]) -> None:
     assert reading.state(NOW) == state
 
 
 def test_columns_are_as_wide_as_the_longest_name() -> None:
     picture = snapshot(readings=[
-        Reading('a', [1], 'N7:0', NOW, 1.0), Reading('longer/name', [2], 'N7:1', NOW, 1.0)])
+        TopicRow('a', [1], 'N7:0', NOW, 1.0), TopicRow('longer/name', [2], 'N7:1', NOW, 1.0)])
     rows = [line for line in lines(picture) if 'fresh' in line]
     assert len({line.index('fresh') for line in rows}) == 1
 
@@ -201,7 +202,7 @@ def test_columns_are_as_wide_as_the_longest_name() -> None:
 def test_strings_of_a_plc_cannot_move_the_cursor_or_forge_a_line() -> None:
     picture = snapshot(
         node='/n\x1b[2J',
-        readings=[Reading('na\nme', 'Tank\x1b[31m\n4', 'N7\r', NOW, 1.0)],
+        readings=[TopicRow('na\nme', 'Tank\x1b[31m\n4', 'N7\r', NOW, 1.0)],
         statuses=[ShownStatus('link', Style.GOOD, 'OK: \x1b]0;', {'settings': '\x9b1m'}),
                   ShownStatus('counters', Style.GOOD, '', {'A\n': '\x00'}),
                   ShownStatus('mappings', Style.GOOD, '', {'tag\n': 'x\u202e'}),
@@ -323,7 +324,7 @@ def test_values_never_take_more_than_their_width(values: list[float] | str, widt
        st.text(ANY_CHARACTER, max_size=400))
 def test_no_line_is_wider_than_the_terminal(width: int, name: str, text: str) -> None:
     picture = snapshot(
-        readings=[Reading(name, text, name, NOW, 1.0)],
+        readings=[TopicRow(name, text, name, NOW, 1.0)],
         statuses=[ShownStatus('link', Style.GOOD, text, {LINK_KEYS[-1]: text}),
                   *(ShownStatus(part, Style.GOOD, text, {name: text})
                     for part in ('mappings', 'counters'))])
