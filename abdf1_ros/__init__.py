@@ -55,17 +55,21 @@ from __future__ import annotations
 TYPE_CHECKING = False  # mypy treats it as true; the import of the module typing is slow
 if TYPE_CHECKING:
     from abdf1_ros.client import Client  # noqa: I300
+    from abdf1_ros.readings import Reading
 
     __version__: str
 
-__all__ = ['Client', '__version__']
+__all__ = ['Client', 'Reading', '__version__']
 
 
 def __getattr__(name: str) -> object:
-    """Return ``Client``, which imports pyserial, or the version: each only when it is used."""
+    """Return a class, which imports pyserial, or the version: each only when it is used."""
     if name == 'Client':
         from abdf1_ros.client import Client
         return Client
+    if name == 'Reading':
+        from abdf1_ros.readings import Reading
+        return Reading
     if name == '__version__':
         from abdf1_ros.paths import package_version
         return package_version()

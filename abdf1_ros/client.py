@@ -45,9 +45,10 @@ from abdf1_ros.df1.peer import PEER
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave_link import SLAVE
 from abdf1_ros.df1.stations import MAX_STATION
-from abdf1_ros.errors import FormatError, LinkError
+from abdf1_ros.errors import Abdf1Error, FormatError, LinkError
 from abdf1_ros.numbers import member_of, one_of, ValueKind
 from abdf1_ros.open_line import (
+    BlockingClient,
     kind_of,
     LOG,
     OpenLine,
@@ -68,11 +69,12 @@ from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.spellings import family_name
 from abdf1_ros.pccc.steps import AddressedValues
 from abdf1_ros.pccc.strings import is_string_element
-from abdf1_ros.pccc.values import ValueType, WordOrder
+from abdf1_ros.pccc.values import Values, ValueType, WordOrder
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.text import first, shown
 
 if TYPE_CHECKING:
+    from abdf1_ros.readings import Reading
     from abdf1_ros.settings.mapping import Mapping as Row
     from abdf1_ros.tagged_client import TaggedClient
 
@@ -87,7 +89,7 @@ Whole = Literal['int16', 'uint16', 'int32', 'uint32', 'bcd16', 'bcd12']
 _T = TypeVar('_T')
 
 
-class Client(OpenLine):
+class Client(BlockingClient):
     """
     The PLC at the far end of a line, or in half duplex the PLCs on it.
 
@@ -129,13 +131,15 @@ class Client(OpenLine):
         settings = PortSettings(_port(port), speed,
                                 parity=_choice('parity', _PARITY, parity))
         times = _whole('retries', retries, 0, _MOST_RETRIES)
-        super().__init__(_choice('duplex', _DUPLEX, duplex), LinkSettings(
-            nak_retries=times, enq_retries=times,
+        mode = _choice('duplex', _DUPLEX, duplex)
+        own = _whole('own_station', own_station, 0, MAX_STATION)
+        self._own_station = None if mode.has_one_plc else own
+        super().__init__(OpenLine(mode, LinkSettings(
+            nak_retries=times, enq_retries=times, station=own,
             checksum=_choice('check', member_of(Checksum), check),
-            station=_whole('own_station', own_station, 0, MAX_STATION),
             timing=LineTiming(settings.char_time), timeout=_seconds('timeout', timeout),
             cmd_timeout=_seconds('cmd_timeout', cmd_timeout)), settings,
-            trace=None if trace is None else path_of('trace', trace), logger=logger)
+            trace=None if trace is None else path_of('trace', trace), logger=logger))
 
     @staticmethod
     def from_files(net_file: str | os.PathLike[str], map_file: str | os.PathLike[str], *,
@@ -191,29 +195,41 @@ class Client(OpenLine):
         """
         number, target = self._target(
             address, 1 if length is None else length, kind, word_order, station)
-        with self.naming(_place(address, number)):
-            found = plain(self.ask(number, steps.read(target)), target.codec.type)
+        with self._line.naming(_place(address, number)):
+            found = plain(self._line.ask(number, steps.read(target)), target.codec.type)
         return single(found, length is None)
 
-    def read_many(self, addresses: Iterable[str], *,
-                  station: int | None = None) -> dict[str, PlcValue]:
+    @overload
+    def read_many(self, addresses: Iterable[str], *, station: int | None = None,
+                  partial: Literal[False] = False) -> dict[str, PlcValue]: ...
+
+    @overload
+    def read_many(self, addresses: Iterable[str], *, station: int | None = None,
+                  partial: Literal[True]) -> dict[str, Reading]: ...
+
+    def read_many(self, addresses: Iterable[str], *, station: int | None = None,
+                  partial: bool = False) -> dict[str, PlcValue] | dict[str, Reading]:
         """
         Return the values at many addresses or ranges (N7:0-9), in as few packets as possible.
 
         The values do not belong to one instant: each packet is a transaction of its own. The keys
         of the result are the addresses, in their order. The value of a range is a list.
+
+        With ``partial`` each address has a ``Reading``: its value or its own error, and the time.
+        Then no error of an address, the PLC or the line is raised. A PLC that has become silent
+        gets no more commands of this call.
         """
-        from abdf1_ros.plan.planner import Planner  # not needed for single reads
-        from abdf1_ros.plan.reading import read_planned
         number = self._of(station)
         if isinstance(addresses, str) or not isinstance(addresses, Iterable):
             raise FormatError(f'addresses {addresses!r} should be a list of addresses')
-        rows = [self._row(text, item, number)
-                for item, text in enumerate(dict.fromkeys(addresses), 1)]
-        with self.naming(_place(first([row.tag for row, _ in rows]), number)):
-            values = dict(read_planned(
-                Planner(self.line_model, 1.0), [row for row, _ in rows], self))
-        return {row.tag: single(plain(values[row], row.type), is_one) for row, is_one in rows}
+        texts = dict.fromkeys([text_of('address', text) for text in addresses])
+        if partial:
+            return self._readings([*texts], number)
+        from abdf1_ros.readings import values_of_rows  # not needed for single reads
+        rows = dict(self._row(text, item, number) for item, text in enumerate(texts, 1))
+        with self._line.naming(_place(first([*texts]), number)):
+            values = values_of_rows(self._line, rows)
+        return {row.tag: _shown(row, values[row], rows[row]) for row in rows}
 
     def write(self, address: str, values: float | str | Sequence[float], kind: str | None = None,
               *, word_order: str = 'Low', station: int | None = None) -> None:
@@ -224,26 +240,44 @@ class Client(OpenLine):
         length = max(1, (len(values) + 1) // 2) if is_packed else \
             1 if isinstance(values, str) else len(values)
         number, target = self._target(address, length, kind, word_order, station)
-        with self.naming(_place(address, number)):
-            self.ask(number, steps.write(target, values))
+        with self._line.naming(_place(address, number)):
+            self._line.ask(number, steps.write(target, values))
 
     def identify(self, station: int | None = None) -> Identity:
         """Return the identity that a station reports: model, mode, faults."""
         number = self._of(station)
-        with self.naming(f'status of station {number}'):
-            return self.ask(number, steps.identify())
+        with self._line.naming(f'status of station {number}'):
+            return self._line.ask(number, steps.identify())
 
     def _of(self, station: int | None) -> int:
         number = _whole('station', self.station if station is None else station, 0, MAX_STATION)
-        if number == self._settings.station and not self._mode.has_one_plc:
+        if number == self._own_station:
             raise FormatError(f'station {number} is own_station, so no PLC can answer as {number}')
         return number
+
+    def _readings(self, texts: Sequence[str], station: int) -> dict[str, Reading]:
+        from abdf1_ros.readings import Reading, readings_of_rows
+        rows: dict[Row, bool] = {}
+        found: dict[str, Reading] = {}
+        try:
+            self._kind_of(station)
+        except Abdf1Error as error:
+            return {text: Reading.failed(error, _place(text, station)) for text in texts}
+        for item, text in enumerate(texts, 1):
+            try:
+                rows |= [self._row(text, item, station)]
+            except FormatError as error:
+                found[text] = Reading.failed(error)
+        with self._line.naming(_place(first(texts), station)):
+            found |= readings_of_rows(self._line, rows, lambda row: _place(row.tag, station),
+                                      lambda row, values: _shown(row, values, rows[row]))
+        return {text: found[text] for text in texts}
 
     def _row(self, text: str, item: int, station: int) -> tuple[Row, bool]:
         """Return a map row for an address or a range, and True if it is a single address."""
         from abdf1_ros.plan.reading import row_of
-        plc_type, processor = self._kind or self._asked(station)
-        with self.naming(_place(text_of('address', text), station), asks=False):
+        plc_type, processor = self._kind_of(station)
+        with self._line.naming(_place(text_of('address', text), station), asks=False):
             found = parse_range(text, plc_type, self._access)
             first, length = (found.first, found.length()) if isinstance(found, AddressRange) \
                 else (found, 1)
@@ -257,13 +291,15 @@ class Client(OpenLine):
         place, count = text_of('address', address), _whole('length', length)
         chosen = None if kind is None else _choice('kind', member_of(ValueType), kind)
         order = _choice('word_order', member_of(WordOrder), word_order)
-        plc_type, processor = self._kind or self._asked(number)
-        with self.naming(_place(place, number), asks=False):
+        plc_type, processor = self._kind_of(number)
+        with self._line.naming(_place(place, number), asks=False):
             return number, AddressedValues.of(place, plc_type, count, chosen, word_order=order,
                                               access=self._access, processor=processor)
 
-    def _asked(self, station: int) -> tuple[PlcType, Processor | None]:
+    def _kind_of(self, station: int) -> tuple[PlcType, Processor | None]:
         """Return family and processor of a station; the station is asked for them only once."""
+        if self._kind is not None:
+            return self._kind
         if station not in self._kinds:
             try:
                 self._kinds[station] = kind_of(
@@ -272,6 +308,10 @@ class Client(OpenLine):
                 error.sent = False  # the command of the call was not
                 raise
         return self._kinds[station]
+
+
+def _shown(row: Row, values: Values, is_one: bool) -> PlcValue:
+    return single(plain(values, row.type), is_one)
 
 
 def _place(address: str, station: int) -> str:

@@ -28,6 +28,7 @@ import time
 from types import TracebackType
 from typing import Any, Generic, Self, TYPE_CHECKING, TypeAlias, TypeVar
 
+from abdf1_ros.counters import Counters
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.mode import LineMode
 from abdf1_ros.df1.packet import is_local_status
@@ -71,6 +72,7 @@ PlcValue: TypeAlias = Any
 _Entry = tuple[int, object, BaseException | None]
 
 _Result = TypeVar('_Result')
+
 
 _ours: set[str] = set()  # the lines that this program has open
 
@@ -143,7 +145,22 @@ class Pending(Generic[_Result]):
         return self._results[0]
 
 
-class OpenLine:
+class _Closes:
+    """Something that the end of ``with`` closes."""
+
+    def close(self) -> None:
+        """Close it."""
+        raise NotImplementedError
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        self.close()
+
+
+class OpenLine(_Closes):
     """
     An open line, which carries out one request at a time; the end of ``with`` closes it.
 
@@ -183,13 +200,6 @@ class OpenLine:
         self._line = line_of(port.name)
         _ours.add(self._line)
         self._link.start()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                 trace: TracebackType | None) -> None:
-        self.close()
 
     @property
     def echoes(self) -> bool:
@@ -278,6 +288,27 @@ class OpenLine:
         if lost := self._lost - self._lost_reported:
             self._lost_reported += lost
             self.log.warning('%s lost here: nothing was asked meanwhile', counted(lost, 'entry'))
+
+
+class BlockingClient(_Closes):
+    """What all clients have: their line, with the state of its stations, and its end."""
+
+    def __init__(self, line: OpenLine) -> None:
+        self._line = line
+
+    @property
+    def counters(self) -> Counters:
+        """Return the counts of all events of the line since it was opened."""
+        return self._line.counters
+
+    @property
+    def stations(self) -> ActiveStationList:
+        """Return the state of each station; an inactive one gets one try for each request."""
+        return self._line.stations
+
+    def close(self) -> None:
+        """End all calls, also waiting ones, and close the port; may come from any thread."""
+        self._line.close()
 
 
 def traced(path: str, port: PortSettings, check: str, duplex: Duplex, open_it: Callable[[], Port],

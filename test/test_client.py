@@ -16,6 +16,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import closing, ExitStack, suppress
+from functools import partial
 from inspect import signature
 from itertools import count
 import logging
@@ -43,7 +44,7 @@ from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import TaskSource
 from abdf1_ros.errors import FormatError, LinkError, PortLost, RemoteError
-from abdf1_ros.open_line import kind_of, OpenLine, Pending
+from abdf1_ros.open_line import kind_of, LOG, OpenLine, Pending
 from abdf1_ros.pccc.identity import Identity, Mode
 from abdf1_ros.pccc.steps import identify
 from abdf1_ros.ports.link_thread import LinkThread
@@ -79,6 +80,13 @@ def port(tmp_path: Path, plcs: PlcPair) -> Iterator[str]:
 def client(port: str, station: int = 1, plc_type: str | None = None) -> Client:
     return Client(port, plc_type=plc_type, station=station, duplex='half', baud=115200,
                   timeout=1.0, cmd_timeout=1.0)
+
+
+def line_with(port: str, timeout: float, logger: logging.Logger = LOG,
+              retries: int = 3) -> OpenLine:
+    """Return the line below a client, whose requests do not wait for their end."""
+    return OpenLine(MASTER, LinkSettings(nak_retries=retries, timeout=timeout),
+                    PortSettings(port, 115200), logger=logger)
 
 
 def client_with(port: str, **more: Any) -> Client:
@@ -180,6 +188,49 @@ def test_many_addresses_are_read_by_the_plan(port: str, plcs: PlcPair) -> None:
                 plc.read_many(wrong)
 
 
+def test_partial_read_has_a_value_or_its_own_error_for_each_address(port: str) -> None:
+    begun = time.time()
+    with client(port, plc_type='SLC') as plc:
+        plc.write('N7:0', [7, 8])
+        found = plc.read_many(['N7:x', 'N7:0', 'N7:250', 'N7:0-1', 'N30:0', 'F8:0'], partial=True)
+        assert list(found) == ['N7:x', 'N7:0', 'N7:250', 'N7:0-1', 'N30:0', 'F8:0']
+        assert {text: reading.value for text, reading in found.items() if not reading.error} == {
+            'N7:0': 7, 'N7:0-1': [7, 8], 'F8:0': 0.0}
+        assert {text: str(reading.error)[:29] for text, reading in found.items()
+                if reading.error} == {
+            'N7:x': 'N7:x of station 1: write type', 'N7:250': 'N7:250 of station 1: STS 50: ',
+            'N30:0': 'N30:0 of station 1: STS 10: i'}
+        assert all(begun <= reading.time <= time.time() for reading in found.values())
+        assert plc.read_many([], partial=True) == {}
+        wrong: Any
+        more: Any
+        for wrong in 'N7:0', 7, [['N7:0']], [None], ['']:
+            for more in {}, {'partial': True}:
+                with pytest.raises(FormatError, match='should be a'):
+                    plc.read_many(wrong, **more)
+        with pytest.raises(FormatError, match='station 300'):
+            plc.read_many(['N7:0'], station=300, partial=True)
+    gone = plc.read_many(['N7:0', 'F8:0'], partial=True)
+    assert [str(reading.error) for reading in gone.values()] == [
+        f'{text} of station 1: port lost: closed by this program' for text in gone]
+
+
+@pytest.mark.parametrize('plc_type', ['SLC', None])
+def test_silent_plc_is_asked_once_for_all_that_is_wanted_of_it(
+        port: str, plc_type: str | None) -> None:
+    with Client(port, plc_type=plc_type, station=9, duplex='half', baud=115200, timeout=0.05,
+                retries=2) as plc:
+        for polls in 0, 1:  # after its retries a silent station gets one poll for each call
+            found = plc.read_many(['N7:0', 'F8:0', 'B3:0'], partial=True)
+            assert [str(reading.error) for reading in found.values()] == [
+                f'{text} of station 9: 2509 ERR_INACTIVE_STATION: Slave Station (9) Inactive'
+                for text in ('N7:0', 'F8:0', 'B3:0')]
+            assert (plc.counters.messages_sent, plc.counters.polls_sent) == (3, polls)
+            sent = [reading.error.sent for reading in found.values()
+                    if isinstance(reading.error, LinkError)]
+            assert sent == [plc_type is not None and not polls, False, False]
+
+
 def test_retries_trace_and_log_are_arguments(port: str, tmp_path: Path,
                                              caplog: pytest.LogCaptureFixture) -> None:
     trace = tmp_path / 'line.cap'
@@ -216,15 +267,15 @@ def test_link_does_not_wait_for_a_handler_of_the_log(port: str) -> None:
         def emit(self, record: logging.LogRecord) -> None:
             if not threads:
                 threads.add(threading.current_thread())
-                plc.read('N7:0')  # it may ask a PLC, too
+                line.ask(1, identify())  # it may ask a PLC, too
             threads.add(threading.current_thread())
 
     threads: set[threading.Thread] = set()
     logger = logging.Logger('test', logging.DEBUG)
     logger.addHandler(Stuck())
-    with client_with(port, timeout=0.1, retries=1, logger=logger) as plc:
-        assert plc.start(9, identify()).wait(PATIENCE) and not threads
-        plc.read('N7:0')
+    with line_with(port, 0.1, logger, retries=1) as line:
+        assert line.start(9, identify()).wait(PATIENCE) and not threads
+        line.ask(1, identify())
     assert threads == {threading.current_thread()}  # in ``close``
 
 
@@ -232,15 +283,15 @@ def test_entries_of_the_log_that_nothing_takes_are_counted(
         port: str, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:
     monkeypatch.setattr('abdf1_ros.open_line.MOST_ENTRIES', 2)
     told = []
-    with client_with(port, timeout=0.05, retries=2) as plc:
+    with line_with(port, 0.05, retries=2) as line:
         for station, level in (9, 'DEBUG'), (8, 'DEBUG'), (7, 'WARNING'):
             caplog.set_level(level, 'abdf1_ros')  # at the end none is lost
-            assert plc.start(station, identify()).wait(PATIENCE)
-            plc.settle()
+            assert line.start(station, identify()).wait(PATIENCE)
+            line.settle()
             told += [re.sub(r'^2(?=\d).*|\d+ entr.* lost', '2', text) for text in caplog.messages]
             caplog.clear()
     assert told == 2 * ['2', '2', '2 here: nothing was asked meanwhile']
-    plc.close()
+    line.close()
     assert not caplog.messages
 
 
@@ -384,10 +435,12 @@ alive,Heartbeat,N7:21,1,SLC,1,,,,
 """
 
 
-def files(folder: Path, port: str, rows: str = MAP, more: str = '') -> tuple[Path, Path]:
+def files(folder: Path, port: str, rows: str = MAP, more: str = '',
+          timeout: int = 1000) -> tuple[Path, Path]:
     net, rows_file = folder / 'net.csv', folder / 'map.csv'
-    net.write_text('PLC_Type,Com_Port,Baud,Polling,Mode\n'
-                   f'SLC,{port},115200,Standard,{more or "Master"}\n', encoding='utf-8')
+    net.write_text(
+        'PLC_Type,Com_Port,Baud,Polling,Mode,Timeout\n'
+        f'SLC,{port},115200,Standard,{more or "Master"},{timeout}\n', encoding='utf-8')
     rows_file.write_text(rows, encoding='utf-8')
     return net, rows_file
 
@@ -422,6 +475,49 @@ def test_rows_of_a_map_are_read_and_written_by_their_tags(
         for tags in 'far', ['far', 'name']:
             with pytest.raises(RemoteError, match=r'^far \(N7:9 of station 1\): STS 10'):
                 plant.read(tags)
+
+
+def test_partial_read_of_tags_costs_a_silent_plc_its_own_values_only(
+        port: str, tmp_path: Path, plcs: PlcPair) -> None:
+    store(plcs[0], 'N7:0', [123])
+    rows = MAP + 'gone,Read,N7:0,9,SLC,1,,,,\ntoo,Read,F8:0,9,SLC,1,,,,\n'
+    with Client.from_files(*files(tmp_path, port, rows, timeout=50)) as plant:
+        assert plant.tags == ['speed', 'doors', 'name', 'far', 'gone', 'too']
+        assert [*plant.rows] == ['speed', 'doors', 'recipe', 'name', 'far', 'gone', 'too']
+        wanted = ['gone', 'sped', *plant.tags, 'recipe']
+        found = plant.read(iter(wanted), partial=True)
+        assert list(found) == [*dict.fromkeys(wanted)]
+        values = {tag: reading.value for tag, reading in found.items() if not reading.error}
+        assert values == {'speed': pytest.approx(12.3), 'doors': [False] * 3, 'name': '',
+                          'far': [0.0, 0.0]}
+        assert plant.read([*values]) == values
+        errors = {tag: str(reading.error) for tag, reading in found.items() if reading.error}
+        silent = '2509 ERR_INACTIVE_STATION: Slave Station (9) Inactive'
+        assert (errors['gone'], errors['too']) == (
+            f'gone (N7:0 of station 9): {silent}', f'too (F8:0 of station 9): {silent}')
+        for tag in 'sped', 'recipe':
+            assert errors[tag].startswith(f"tag '{tag}' should be that of a row that is read: sp")
+        assert plant.read('speed', partial=True)['speed'].value == values['speed']
+        with pytest.raises(FormatError, match='tag None should be a text'):
+            plant.read([None], partial=True)  # type: ignore[call-overload]
+
+
+def test_map_without_such_rows_says_so(port: str, tmp_path: Path) -> None:
+    with Client.from_files(*files(tmp_path, port, MAP[:MAP.index('speed')] + (
+            'doors,Read,B3:0/0,2,PLC5,3,,,,\n'))) as plant, pytest.raises(
+                FormatError, match="'doors' should be .* a row that is written: the map has none"):
+        plant.write('doors', 1)
+
+
+def test_names_of_a_client_are_those_of_the_library(port: str, tmp_path: Path) -> None:
+    """Completion shows them."""
+    everywhere = ['close', 'counters', 'read', 'stations', 'write']
+    for made, more in (
+            (partial(client, port), ['from_files', 'identify', 'read_many', 'station']),
+            (partial(Client.from_files, *files(tmp_path, port)), ['rows', 'tags'])):
+        with made() as here:
+            assert sorted(everywhere + more) == [
+                name for name in dir(here) if not name.startswith('_')]
 
 
 def test_faults_of_the_files_are_told_before_the_port_is_opened(tmp_path: Path) -> None:
@@ -481,7 +577,7 @@ def test_bug_in_the_thread_of_the_link_is_logged_and_ends_what_waits(port: str) 
     logger, log = Broken('broken'), list[str]()
     logger.addHandler(Mock(level=0, handle=lambda record: log.append(
         f'{record.levelname} {record.getMessage()} {record.exc_info[0].__name__}')))
-    with client_with(port, timeout=0.05, logger=logger) as here, \
+    with line_with(port, 0.05, logger) as here, \
             pytest.raises(PortLost, match='^port lost: internal error, see the log$'):
         here.wait(here.start(9, identify()))
     assert log == ['CRITICAL internal error ZeroDivisionError']

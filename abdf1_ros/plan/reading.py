@@ -45,8 +45,21 @@ def read_planned(planner: Planner, mappings: Iterable[Mapping],
     """
     Yield each mapping with its values.
 
+    Raises the errors of ``line`` and of the steps; ``about`` names the mappings that it concerns.
+    """
+    for mapping, found in read_each(planner, mappings, line):
+        if isinstance(found, Abdf1Error):
+            raise found
+        yield mapping, found
+
+
+def read_each(planner: Planner, mappings: Iterable[Mapping],
+              line: Asking) -> Iterator[tuple[Mapping, Values | Abdf1Error]]:
+    """
+    Yield each mapping with its values, or with the error of ``line`` or of the steps.
+
     If a station refuses a block, its parts are read, so that an error concerns as few mappings as
-    possible. Raises the errors of ``line`` and of the steps; ``about`` names those mappings.
+    possible. ``about`` names those mappings.
     """
     waiting = planner.plan(mappings)
     while waiting:
@@ -57,19 +70,23 @@ def read_planned(planner: Planner, mappings: Iterable[Mapping],
         except Abdf1Error as error:
             parts = planner.split(block) \
                 if isinstance(error, RemoteError) and is_address_fault(error) else []
-            if not parts:
-                error.about = f'{first([row.tag for row in block.mappings])} ' \
-                              f'({block.start} of station {block.station})'
-                raise
-            waiting[:0] = parts
+            if parts:
+                waiting[:0] = parts
+                continue
+            error.about = f'{first([row.tag for row in block.mappings])} ' \
+                          f'({block.start} of station {block.station})'
+            yield from ((mapping, error) for mapping in block.mappings)
         else:
             for mapping in block.mappings:
-                try:
-                    values = mapping.codec.decode(data[block.slice_of(mapping)])
-                except FormatError as error:
-                    error.about = f'{mapping.tag} ({mapping.address} of station {block.station})'
-                    raise
-                yield mapping, values
+                yield mapping, _decoded(mapping, data[block.slice_of(mapping)])
+
+
+def _decoded(mapping: Mapping, data: bytes) -> Values | FormatError:
+    try:
+        return mapping.codec.decode(data)
+    except FormatError as error:
+        error.about = f'{mapping.tag} ({mapping.address} of station {mapping.station})'
+        return error
 
 
 def row_of(text: str, item: int, station: int, target: AddressedValues, access: Access | None,

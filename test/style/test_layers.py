@@ -202,8 +202,9 @@ def test_only_what_shows_the_time_of_day_asks_for_it() -> None:
         PACKAGE / module).read_text(encoding='utf-8'))) for module in MODULES}
     assert {module: count for module, count in asked.items() if count} == {
         'cli/monitor/node.py': 1, 'cli/plc/verbs/clock.py': 3, 'cli/plc/watch.py': 2,
-        'ports/trace.py': 1, 'ros/bridge/session.py': 1, 'ros/process/main.py': 1,
-        'ros/topics/services.py': 1, 'ros/topics/snapshot.py': 1, 'ros/topics/writes.py': 1}
+        'ports/trace.py': 1, 'readings.py': 2, 'ros/bridge/session.py': 1,
+        'ros/process/main.py': 1, 'ros/topics/services.py': 1, 'ros/topics/snapshot.py': 1,
+        'ros/topics/writes.py': 1}
 
 
 def test_dataclasses_have_slots_and_are_frozen_unless_a_field_is_assigned() -> None:
