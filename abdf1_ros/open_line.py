@@ -24,12 +24,13 @@ from numbers import Real
 import os
 from queue import Empty, SimpleQueue
 import random
+from threading import current_thread
 import time
 from types import TracebackType
 from typing import Any, Generic, Self, TYPE_CHECKING, TypeAlias, TypeVar
 
 from abdf1_ros.counters import Counters
-from abdf1_ros.df1.frames import Duplex
+from abdf1_ros.df1.frames import Duplex, MAX_LINK_DATA
 from abdf1_ros.df1.mode import LineMode
 from abdf1_ros.df1.packet import is_local_status
 from abdf1_ros.df1.settings import LinkSettings
@@ -74,25 +75,29 @@ _Entry = tuple[int, object, BaseException | None]
 _Result = TypeVar('_Result')
 
 
-_ours: set[str] = set()  # the lines that this program has open
-
-
 class OpenedPort:
     """
     A port that is open: a call returns it, and each later call opens it again.
 
-    So a port that does not exist raises OSError here, and not in the thread of the link.
+    So a port that does not exist raises OSError here, and not in the thread of the link. If
+    another thread of this program has the port, its ``close`` is waited for.
     """
 
     def __init__(self, settings: PortSettings) -> None:
         self._settings = settings
-        try:
-            self._ports = [open_port(settings)]
-        except OSError as error:
-            if line_of(settings.name) in _ours:
-                error.strerror = 'this program has it open already; is a close() missing?'
-            name_port(error, settings.name)
-            raise
+        line = line_of(settings.name)
+        while True:
+            holder = _ours.get(line)  # before the attempt, so that no end is missed
+            try:
+                self._ports = [open_port(settings)]
+                return
+            except OSError as error:
+                if holder is not None and holder.has_ended_elsewhere():
+                    continue
+                if line in _ours:
+                    error.strerror = 'this program has it open already; is a close() missing?'
+                name_port(error, settings.name)
+                raise
 
     def __call__(self) -> Port:
         return self._ports.pop() if self._ports else open_port(self._settings)
@@ -143,6 +148,30 @@ class Pending(Generic[_Result]):
         if self.error is not None:
             raise self.error
         return self._results[0]
+
+
+class Holder:
+    """
+    The thread that has a line open; during ``close`` it is the thread that closes the line.
+
+    ``longest`` returns the time (s) of the longest transaction on the line.
+    """
+
+    def __init__(self, longest: Callable[[], float]) -> None:
+        self.thread = current_thread()
+        self.end = Pending[None]()
+        self._longest = longest
+
+    def has_ended_elsewhere(self) -> bool:
+        """Wait for the end by another thread, at most for a transaction; tell if it has come."""
+        if self.thread is not current_thread():
+            give_up = time.monotonic() + self._longest()
+            while not self.end.wait(_GLANCE) and time.monotonic() < give_up:
+                pass
+        return self.end.is_done
+
+
+_ours: dict[str, Holder] = {}  # by line, what this program has open
 
 
 class _Closes:
@@ -198,7 +227,8 @@ class OpenLine(_Closes):
                                     logging.CRITICAL, 'internal error', error))
         self._link.daemon = True  # after a KeyboardInterrupt before ``with`` no code stops it
         self._line = line_of(port.name)
-        _ours.add(self._line)
+        self._holder = _ours[self._line] = Holder(lambda: mode.longest_transaction(
+            line, self.line_model.transaction_time(MAX_LINK_DATA, MAX_LINK_DATA)))
         self._link.start()
 
     @property
@@ -238,13 +268,16 @@ class OpenLine(_Closes):
 
     def close(self) -> None:
         """End all requests, also waiting ones, and close the port."""
+        self._holder.thread = current_thread()
         self._link.stop()
         self._port.close()  # the thread may not have come to it
         self._requests.close()
         self._log_entries()
         if self._trace is not None:
             self._trace.close()
-        _ours.discard(self._line)
+        if _ours.get(self._line) is self._holder:
+            del _ours[self._line]
+        self._holder.end.succeed(None)
 
     @property
     def line_model(self) -> LineModel:

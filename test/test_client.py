@@ -15,6 +15,7 @@
 """The blocking client on a line with simulated PLCs, and what it does without."""
 
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, ExitStack, suppress
 from functools import partial
 from inspect import signature
@@ -393,6 +394,36 @@ def test_forgotten_close_is_told_and_closed_client_refuses(
         assert plc.read('N7:0') == 0
     with closing(open_port(PortSettings(port))), pytest.raises(OSError, match='another program'):
         client(port)
+
+
+def test_close_in_another_thread_is_waited_for(
+        port: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    begun, may_end, stop = threading.Event(), threading.Event(), LinkThread.stop
+
+    def slow(thread: LinkThread) -> None:
+        begun.set()
+        assert may_end.wait(PATIENCE)
+        stop(thread)
+
+    with monkeypatch.context() as patch, ThreadPoolExecutor() as pool:
+        patch.setattr(LinkThread, 'stop', slow)
+        closing = pool.submit(client(port, plc_type='SLC').close)
+        assert begun.wait(PATIENCE)
+        opening = pool.submit(client, port)
+        with pytest.raises(TimeoutError):
+            opening.result(0.3)
+        may_end.set()
+        closing.result(PATIENCE)
+        opening.result(PATIENCE).close()
+
+
+def test_other_thread_that_does_not_close_is_waited_for_as_long_as_a_transaction_takes(
+        port: str) -> None:
+    with ThreadPoolExecutor() as pool:
+        with pool.submit(client_with, port, timeout=0.05, cmd_timeout=0.1, retries=0).result(), \
+                pytest.raises(OSError, match='this program has it open already; is a close'):
+            client(port)
+        client(port).close()
 
 
 def test_line_that_comes_back_is_used_again(

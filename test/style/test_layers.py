@@ -28,7 +28,7 @@ _SANS_IO = {'time', 'threading', 'serial', 'select', 'socket', 'os', 'rclpy'}
 _WAITING = {'select', 'threading'}
 _MAY_WAIT = ('signals.py', 'testing.py', 'ports/', 'ros/lines.py', 'ros/process/main.py',
              'ros/callbacks.py', 'ros/parameters/file_watch.py', 'console.py', 'cli/simulator.py',
-             'cli/sniff.py', 'cli/plc/watch.py')
+             'cli/sniff.py', 'cli/plc/watch.py', 'open_line.py')
 
 
 def _may_use_ros(module: str) -> bool:
