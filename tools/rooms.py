@@ -76,8 +76,10 @@ ROOMS = (
     Room(('pccc',), 'the commands: addresses, values, data table, server; a folder for each PLC '
          'family',
          ('errors', 'counters', 'text', 'df1.packet')),
+    Room(('cip',), 'EtherNet/IP and CIP around a PCCC command: sessions, connections, identity',
+         ('errors', 'pccc.fields')),
     Room(('sniffer',), 'recorded bytes, and traffic in words',
-         ('problems', 'text', 'numbers', 'df1', 'pccc')),
+         ('problems', 'text', 'numbers', 'df1', 'pccc', 'cip')),
     Room(('settings',), 'both CSV files',
          ('errors', 'messages', 'problems', 'numbers', 'text', 'line_names', 'df1', 'pccc')),
     Room(('plan',), 'the read plan: blocks, their cost on the line, bounds and remarks',

@@ -29,6 +29,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 import struct
 
+from abdf1_ros.cip.encapsulation import COMMANDS, EipCommand, EipItem, HEADER_SIZE, PORT
+from abdf1_ros.cip.requests import CipService, REPLY
 from abdf1_ros.sniffer.capture import Chunk, Direction
 from abdf1_ros.sniffer.packet_files import RecordedPacket
 from abdf1_ros.sniffer.pcapng import DIRECTIONS, HEAD_SIZE, LINK_TYPE, VERSION
@@ -40,7 +42,6 @@ _RTAC_EVENTS = {1: Direction.OUT, 2: Direction.IN, 3: Direction.OUT, 4: Directio
 
 _DIRECTIONS = {number: way for way, number in DIRECTIONS.items()}
 
-_PORT = 44818
 CSP = 2222  # PCCC of older Ethernet processors, in a format of its own
 # Number of bytes before an IPv4 header, and the position of its EtherType in them, by link type:
 # loopback, Ethernet, raw IP, Linux cooked 1 and 2.
@@ -50,10 +51,7 @@ _TAGS = b'\x81\x00', b'\x88\xA8'  # 802.1Q and 802.1ad
 _MOST_STREAMS = 1000
 _MOST_EARLY = 8  # segments that wait for an earlier segment
 
-_SEND_RR, _SEND_UNIT = 0x6F, 0x70
-_COMMANDS = (0x00, 0x01, 0x04, 0x63, 0x64, 0x65, 0x66, _SEND_RR, _SEND_UNIT, 0x72, 0x73)
-_CONNECTED, _UNCONNECTED = 0xB1, 0xB2  # items
-_EXECUTE_PCCC, _UNCONNECTED_SEND, _REPLY = 0x4B, 0x52, 0x80  # services
+_SENDS = EipCommand.SEND_RR_DATA, EipCommand.SEND_UNIT_DATA
 _PCCC_OBJECT = b'\x20\x67', b'\x21\x00\x67\x00'  # a path begins with its class
 
 
@@ -104,7 +102,7 @@ class _Stream:
 
     def _take_early(self, number: int, data: bytes) -> Iterator[bytes]:
         messages = [*_sent(_messages(data)[0])]
-        if messages and sum(map(len, messages)) == len(data) - 24 * len(messages):
+        if messages and sum(map(len, messages)) == len(data) - HEADER_SIZE * len(messages):
             if number not in self._taken:
                 yield from messages
             self._taken[number] = len(data)
@@ -131,21 +129,22 @@ class _Stream:
 def _messages(data: bytes) -> tuple[list[bytes], bytes]:
     """Return the whole messages that data begins with, and bytes that may begin the next one."""
     found: list[bytes] = []
-    while len(data) >= 24:
+    while len(data) >= HEADER_SIZE:
         command, size = struct.unpack_from('<HH', data)
-        if command not in _COMMANDS:
+        if command not in COMMANDS:
             return found, b''  # not the beginning of a message
-        if len(data) < 24 + size:
+        end = HEADER_SIZE + size
+        if len(data) < end:
             break
-        found.append(data[:24 + size])
-        data = data[24 + size:]
+        found.append(data[:end])
+        data = data[end:]
     return found, data
 
 
 def _sent(messages: Iterable[bytes]) -> Iterator[bytes]:
     """Yield the data of messages that contain CIP."""
-    return (message[24:] for message in messages
-            if struct.unpack_from('<H', message)[0] in (_SEND_RR, _SEND_UNIT))
+    return (message[HEADER_SIZE:] for message in messages
+            if struct.unpack_from('<H', message)[0] in _SENDS)
 
 
 class _Connections:
@@ -176,7 +175,7 @@ class _Connections:
             yield from self._chunks(ends, message, time)
 
     def _chunks(self, ends: bytes, message: bytes, time: float | None) -> Iterator[Chunk]:
-        way = Direction.OUT if ends[10:12] == _PORT.to_bytes(2, 'big') else Direction.IN
+        way = Direction.OUT if ends[10:12] == PORT.to_bytes(2, 'big') else Direction.IN
         for is_reply, pccc in _pccc(message):
             if not is_reply:
                 self._streams[ends].asked.add(pccc[2:4])
@@ -218,9 +217,9 @@ def chunks_of(packets: Iterable[RecordedPacket], seen: SeenPackets) -> Iterator[
             ends, number, payload, is_first, is_cut = segment
             both = {int.from_bytes(ends[8:10], 'big'), int.from_bytes(ends[10:], 'big')}
             seen.ports |= both
-            if _PORT in both and is_cut:
+            if PORT in both and is_cut:
                 seen.cut.append(len(data))
-            elif _PORT in both:
+            elif PORT in both:
                 yield from connections.feed(ends, number, payload, later, is_first=is_first)
     yield from connections.flush(later)
 
@@ -258,25 +257,25 @@ def _pccc(message: bytes) -> Iterator[tuple[bool, bytes]]:
         item, size = int.from_bytes(message[at:at + 2], 'little'), int.from_bytes(
             message[at + 2:at + 4], 'little')
         data, at = message[at + 4:at + 4 + size], at + 4 + size
-        if item == _CONNECTED:
+        if item == EipItem.CONNECTED_DATA:
             data = data[2:]  # after the sequence count
-        if item in (_CONNECTED, _UNCONNECTED):
+        if item in (EipItem.CONNECTED_DATA, EipItem.UNCONNECTED_DATA):
             found = _executed(data)
             if len(found) >= 4:
-                yield bool(data[0] & _REPLY), found
+                yield bool(data[0] & REPLY), found
 
 
 def _executed(cip: bytes) -> bytes:
     """Return the PCCC of a CIP request or response; empty if it has none."""
-    while len(cip) >= 4 and cip[0] == _UNCONNECTED_SEND:
+    while len(cip) >= 4 and cip[0] == CipService.UNCONNECTED_SEND:
         body = cip[2 + 2 * cip[1]:]
         cip = body[4:4 + int.from_bytes(body[2:4], 'little')]
     if len(cip) < 4:
         return b''
-    if cip[0] == _EXECUTE_PCCC | _REPLY:
+    if cip[0] == CipService.EXECUTE_PCCC | REPLY:
         body = cip[4 + 2 * cip[3]:]
     else:
         body = cip[2 + 2 * cip[1]:]
-        if cip[0] != _EXECUTE_PCCC or not cip[2:].startswith(_PCCC_OBJECT):
+        if cip[0] != CipService.EXECUTE_PCCC or not cip[2:].startswith(_PCCC_OBJECT):
             return b''
     return body[body[0]:] if body else b''  # after the requestor, which begins with its length

@@ -30,10 +30,11 @@ from abdf1_ros.settings.columns import COLUMNS
 from abdf1_ros.settings.network import FIELDS
 from abdf1_ros.simulator import simulated_plc
 from abdf1_ros.sniffer.capture import Chunk, Direction
+from support.ethernet_ip import execute, forward_close, forward_open, message, REGISTER, routed
 from support.vectors import CAPTURED, commands, MESSAGES, VECTORS
 
 TARGETS = ('frames', 'addresses', 'net_csv', 'map_csv', 'simulator_csv', 'typed_data', 'server',
-           'links', 'captures')
+           'links', 'captures', 'ethernet_ip')
 
 _FOLDER = Path(__file__).resolve().parent / 'corpus'
 _CONFIG = Path(__file__).resolve().parents[3] / 'config'
@@ -170,7 +171,28 @@ def _captures() -> Iterable[bytes]:
                            for how, entry in ((0, command), (1, reply)))
 
 
+def _ethernet_ip() -> Iterable[bytes]:
+    read = execute(bytes.fromhex('0F 00 34 12 A2 02 07 89 00 00'))
+    whole = [message(0x63), message(0x04), message(0x64), REGISTER, message(0x66, session=1),
+             message(0x00, b'any')]
+    requests = [read, routed(read), routed(read, bytes((1, 0))), forward_open(), forward_close(),
+                forward_open(bytes.fromhex('01 00 20 02 24 01'), is_large=True),
+                bytes.fromhex('01 02 20 01 24 01'), bytes.fromhex('0E 03 20 01 24 01 30 07')]
+    for data in whole:
+        yield b'\0\0' + _step(24, data)
+    for request in requests:
+        yield b''.join((b'\0\0\1\0', _step(4, request), _step(16, b'\x2A\0'), b'\x0C\x03',
+                        bytes(3), _step(5, request), b'\x14\0'))
+    for pause in b'', b'\x0C\x0B' + bytes(11):
+        yield b''.join((b'\0\0', _step(4, forward_open()), _step(8, read), pause,
+                        _step(8 | 128, read), _step(16, b'\x2A\0'), _step(4, forward_close())))
+
+
+def _step(how: int, data: bytes) -> bytes:
+    return bytes((how, len(data))) + data
+
+
 _SEEDS = {
     'frames': _frames, 'addresses': _addresses, 'net_csv': _net_csv, 'map_csv': _map_csv,
     'simulator_csv': _simulator_csv, 'typed_data': _typed_data, 'server': _server,
-    'links': _links, 'captures': _captures}
+    'links': _links, 'captures': _captures, 'ethernet_ip': _ethernet_ip}
