@@ -31,11 +31,13 @@ milliseconds). The errors are defined in ``abdf1_ros.errors``.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 import logging
 import math
 from numbers import Real
 import os
+import re
 from typing import Literal, overload, SupportsIndex, TYPE_CHECKING, TypeVar
 
 from abdf1_ros.df1.checksum import Checksum
@@ -45,7 +47,7 @@ from abdf1_ros.df1.peer import PEER
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave_link import SLAVE
 from abdf1_ros.df1.stations import MAX_STATION
-from abdf1_ros.errors import Abdf1Error, FormatError, LinkError
+from abdf1_ros.errors import Abdf1Error, FormatError, LinkError, RemoteError
 from abdf1_ros.numbers import member_of, one_of, ValueKind
 from abdf1_ros.open_line import (
     BlockingClient,
@@ -85,6 +87,12 @@ _MOST_RETRIES = 10
 
 Whole = Literal['int16', 'uint16', 'int32', 'uint32', 'bcd16', 'bcd12']
 """The kinds whose values are int."""
+
+_IN_PYTHON = (
+    (re.compile(r', and Length (\d+)'), r', length=\1'), (re.compile('own row'), 'own address'),
+    (re.compile('a row each'), 'an address each'),
+    (re.compile('in the column Processor'), 'by processor='))
+"""Words of errors about a map, and the words about a call in their place."""
 
 _T = TypeVar('_T')
 
@@ -195,7 +203,7 @@ class Client(BlockingClient):
         """
         number, target = self._target(
             address, 1 if length is None else length, kind, word_order, station)
-        with self._line.naming(_place(address, number)):
+        with self._naming(_place(address, number)):
             found = plain(self._line.ask(number, steps.read(target)), target.codec.type)
         return single(found, length is None)
 
@@ -227,7 +235,7 @@ class Client(BlockingClient):
             return self._readings([*texts], number)
         from abdf1_ros.readings import values_of_rows  # not needed for single reads
         rows = dict(self._row(text, item, number) for item, text in enumerate(texts, 1))
-        with self._line.naming(_place(first([*texts]), number)):
+        with self._naming(_place(first([*texts]), number)):
             values = values_of_rows(self._line, rows)
         return {row.tag: _shown(row, values[row], rows[row]) for row in rows}
 
@@ -240,14 +248,27 @@ class Client(BlockingClient):
         length = max(1, (len(values) + 1) // 2) if is_packed else \
             1 if isinstance(values, str) else len(values)
         number, target = self._target(address, length, kind, word_order, station)
-        with self._line.naming(_place(address, number)):
+        with self._naming(_place(address, number)):
             self._line.ask(number, steps.write(target, values))
 
     def identify(self, station: int | None = None) -> Identity:
         """Return the identity that a station reports: model, mode, faults."""
         number = self._of(station)
-        with self._line.naming(f'status of station {number}'):
+        with self._naming(f'status of station {number}'):
             return self._line.ask(number, steps.identify())
+
+    @contextmanager
+    def _naming(self, place: str, asks: bool = True) -> Iterator[None]:
+        """Add ``place`` to errors of the block, and let them speak of a call, not of a row."""
+        with self._line.naming(place, asks):
+            try:
+                yield
+            except (FormatError, RemoteError) as error:
+                text = str(error.args[0])
+                for pattern, right in _IN_PYTHON:
+                    text = pattern.sub(right, text)
+                error.args = (text,)
+                raise
 
     def _of(self, station: int | None) -> int:
         number = _whole('station', self.station if station is None else station, 0, MAX_STATION)
@@ -268,7 +289,7 @@ class Client(BlockingClient):
                 rows |= [self._row(text, item, station)]
             except FormatError as error:
                 found[text] = Reading.failed(error)
-        with self._line.naming(_place(first(texts), station)):
+        with self._naming(_place(first(texts), station)):
             found |= readings_of_rows(self._line, rows, lambda row: _place(row.tag, station),
                                       lambda row, values: _shown(row, values, rows[row]))
         return {text: found[text] for text in texts}
@@ -277,7 +298,7 @@ class Client(BlockingClient):
         """Return a map row for an address or a range, and True if it is a single address."""
         from abdf1_ros.plan.reading import row_of
         plc_type, processor = self._kind_of(station)
-        with self._line.naming(_place(text_of('address', text), station), asks=False):
+        with self._naming(_place(text_of('address', text), station), asks=False):
             found = parse_range(text, plc_type, self._access)
             first, length = (found.first, found.length()) if isinstance(found, AddressRange) \
                 else (found, 1)
@@ -288,11 +309,13 @@ class Client(BlockingClient):
     def _target(self, address: str, length: SupportsIndex, kind: str | None, word_order: str,
                 station: int | None) -> tuple[int, AddressedValues]:
         number = self._of(station)
-        place, count = text_of('address', address), _whole('length', length)
+        if isinstance(address, list | tuple):
+            raise FormatError('read takes one address; read_many takes several')
+        place, count = text_of('address', address), _whole('length', length, 1)
         chosen = None if kind is None else _choice('kind', member_of(ValueType), kind)
         order = _choice('word_order', member_of(WordOrder), word_order)
         plc_type, processor = self._kind_of(number)
-        with self._line.naming(_place(place, number), asks=False):
+        with self._naming(_place(place, number), asks=False):
             return number, AddressedValues.of(place, plc_type, count, chosen, word_order=order,
                                               access=self._access, processor=processor)
 
@@ -319,18 +342,21 @@ def _place(address: str, station: int) -> str:
 
 
 def _port(value: str | os.PathLike[str]) -> str:
+    """Return the name of a port; if the name has no slash, there has to be such a file."""
     path = path_of('port', value)
-    if '://' in path:
-        from abdf1_ros.settings.network import is_url, URLS  # not needed for a device
+    if '://' in path or ('/' not in path and not os.path.exists(path)):
+        from abdf1_ros.settings.network import is_url, port_advice, URLS  # not for a device
         if not is_url(path):
-            raise FormatError(f'port {shown(repr(path))} should be a device path, {URLS}')
+            raise FormatError(f'port {shown(repr(path))} should be a device path, {URLS}; '
+                              f'{port_advice(path)}')
     return path
 
 
 def _whole(name: str, value: object, low: float = -math.inf, high: float = math.inf) -> int:
     number = value.__index__() if isinstance(value, SupportsIndex) else None  # numpy's too
     if number is None or isinstance(value, bool) or not low <= number <= high:
-        bounds = f' from {low} to {high}' if high < math.inf else ''
+        bounds = f' from {low} to {high}' if high < math.inf else \
+            f' from {low} on' if low > -math.inf else ''
         raise FormatError(f'{name} {shown(repr(value))} should be a whole number{bounds}')
     return number
 

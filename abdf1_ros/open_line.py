@@ -408,7 +408,7 @@ def values_of(values: object) -> Sequence[float] | str:
     found = values.tolist() if hasattr(values, 'tolist') else values
     found = [found] if isinstance(found, Real) else found
     if isinstance(found, str) or (
-            isinstance(found, Sequence) and not isinstance(found, bytes)
+            isinstance(found, Sequence) and found and not isinstance(found, bytes)
             and all(isinstance(value, Real) for value in found)):
         return found
     raise FormatError(f'{shown(repr(values))} should be a number, several, or a text')

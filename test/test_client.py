@@ -299,12 +299,18 @@ def test_entries_of_the_log_that_nothing_takes_are_counted(
 @for_all(('address', 'arguments', 'text'), [
     ('N7', {}, 'an element is missing, as in N7:0'),
     ('F8:0', {'length': 300}, '300 elements do not fit at F8:0; .* F8:255$'),
-    ('N7:0', {'length': 0}, '0 elements do not fit'),
+    ('N7:0', {'length': 0}, '^length 0 should be a whole number from 1 on$'),
+    ('N7:0-2', {}, '^N7:0-2 of station 1: write N7:0, length=3$'),
+    ('B3:0/0-B3:1/3', {}, 'bits of several words; write B3:0/0, length=20$'),
+    ('T4:0.ACC-T4:2.ACC', {}, 'not neighbours; an address each for T4:0.ACC, T4:1.ACC, T4:2.ACC, '
+     'or the whole elements with T4:0, length=9$'),
+    ('ST9:0-1', {}, 'each string needs its own address: ST9:0, ST9:1'),
+    (['N7:0'], {}, '^read takes one address; read_many takes several$'),
     ('F8:0', {'kind': 'int16'}, 'F8:0 can be float32'),
     ('N7:0', {'kind': 'int'}, "kind 'int' should be one of bool, int16"),
     ('N7:0', {'kind': 7}, 'kind 7 should be one of'), (None, {}, 'address None should be a text'),
     (Path('N7:0'), {}, 'address .* should be a text'),
-    ('N7:0', {'length': 3.0}, '^length 3.0 should be a whole number$'),
+    ('N7:0', {'length': 3.0}, '^length 3.0 should be a whole number from 1 on$'),
     ('N7:0', {'length': '3'}, "length '3' should be a whole number"),
     ('N7:0', {'station': '1'}, "station '1' should be"),
     ('N7:0', {'station': 5}, 'station 5 is own_station, so no PLC can answer as 5'),
@@ -317,7 +323,8 @@ def test_entries_of_the_log_that_nothing_takes_are_counted(
         ('N7:0', 70000, 'value 70000 at index 0 is not a valid int16'),
         ('T4:0.CON', 1, 'T4:0 belongs to the processor'), ('ST9:0', 5, 'not a valid string'),
         ('N7:0', None, 'None should be a number, several, or a text'),
-        ('N7:0', [[1]], 'should be a'), ('N7:0', {1: 2}, 'should be a'),
+        ('N7:0', [[1]], 'should be a'), ('N7:0', [], r'\[\] should be a number, several'),
+        ('N7:0', {1: 2}, 'should be a'),
         ('N7:0', b'1', 'should be a'), ('N7:0', [1, '1'], 'should be')))])
 def test_what_is_wrong_in_a_call_is_told_before_anything_is_sent(
         port: str, address: Any, arguments: dict[str, Any], text: str) -> None:
@@ -350,7 +357,11 @@ def test_arguments_of_the_line(tmp_path: Path) -> None:
         with pytest.raises(FormatError, match=text):
             Client(port, **wrong)  # type: ignore[arg-type]
     for name, right in ((None, 'text'), (5, 'text'), ('', 'text'), *(
-            (f'socket://host{end}', 'device path, socket') for end in ('', ':x', ':99999'))):
+            (f'socket://host{end}', 'device path, socket') for end in ('', ':x', ':99999')), *(
+            (name, f'device path, socket://host:port or rfc2217://host:port; {cure}$')
+            for name, cure in (('192.168.1.5:4001', 'write socket://192.168.1.5:4001'),
+                               ('COM3', '"plc ports" lists the devices'),
+                               ('ttyUSB0', '"plc ports" lists the devices')))):
         with pytest.raises(FormatError, match=f'port {name!r} should be a {right}'):
             Client(name)  # type: ignore[arg-type]
     with pytest.raises(OSError, match='none'):

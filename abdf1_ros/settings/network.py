@@ -337,21 +337,24 @@ def make_network(values: MappingType[str, tuple[str, Place | str]],
     return Network(**checked)
 
 
-def _port_fault(text: str) -> str:
-    if is_url(text) or _is_device(text):
-        return ''
-    advice = f'"plc ports" lists the devices{hint(text)}'
+def port_advice(text: str) -> str:
+    """Return what may be meant by a text that is neither a device path nor a URL."""
     match = _HOST.fullmatch(text)
     if match and match['port'] and not _is_host(match['host']):
-        advice = f'"{shown(match["host"])}" is not the name of a host'
-    elif match and match['port'] and int(match['port'][1:]) > MOST_PORT:
-        advice = f'a port is at most {MOST_PORT}'
-    elif match and match['port']:
-        advice = f'write socket://{shown(match["host"])}{match["port"]}'
-    elif match and match['scheme']:
-        advice = f'the port is missing, as in {shown(text)}:4001'
-    return (f'Com_Port = "{shown(text)}" should be a number from 1, a device path such as '
-            f'/dev/ttyUSB0, {URLS}; {advice}')
+        return f'"{shown(match["host"])}" is not the name of a host'
+    if match and match['port'] and int(match['port'][1:]) > MOST_PORT:
+        return f'a port is at most {MOST_PORT}'
+    if match and match['port']:
+        return f'write socket://{shown(match["host"])}{match["port"]}'
+    if match and match['scheme']:
+        return f'the port is missing, as in {shown(text)}:4001'
+    return f'"plc ports" lists the devices{hint(text)}'
+
+
+def _port_fault(text: str) -> str:
+    return '' if is_url(text) or _is_device(text) else (
+        f'Com_Port = "{shown(text)}" should be a number from 1, a device path such as '
+        f'/dev/ttyUSB0, {URLS}; {port_advice(text)}')
 
 
 def _second_fault(text: str) -> str:
