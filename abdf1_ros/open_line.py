@@ -206,8 +206,8 @@ class OpenLine(_Closes):
                  logger: logging.Logger = LOG) -> None:
         if mode.only_listens:
             raise ConfigurationError([Problem('Mode', (
-                f'in Mode {mode.name} nothing may be sent on this line; "sniff" shows its '
-                'traffic'))])
+                f'in Mode {mode.name} nothing may be sent on this line; "plc log" has its '
+                'values, "sniff" its traffic'))])
         self.log = logger
         self._entries: deque[_Entry] = deque()
         self._lost = self._lost_reported = 0  # entries

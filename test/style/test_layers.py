@@ -28,7 +28,7 @@ _SANS_IO = {'time', 'threading', 'serial', 'select', 'socket', 'os', 'rclpy'}
 _WAITING = {'select', 'threading'}
 _MAY_WAIT = ('signals.py', 'testing.py', 'ports/', 'ros/lines.py', 'ros/process/main.py',
              'ros/callbacks.py', 'ros/parameters/file_watch.py', 'console.py', 'cli/simulator.py',
-             'cli/sniff.py', 'cli/plc/watch.py', 'open_line.py')
+             'cli/sniff.py', 'open_line.py')
 
 
 def _may_use_ros(module: str) -> bool:
@@ -201,10 +201,10 @@ def test_only_what_shows_the_time_of_day_asks_for_it() -> None:
     asked = {module: len(re.findall(r'\btime\.time(?:_ns)?\b|\bdatetime\.now\b', (
         PACKAGE / module).read_text(encoding='utf-8'))) for module in MODULES}
     assert {module: count for module, count in asked.items() if count} == {
-        'cli/monitor/node.py': 1, 'cli/plc/verbs/clock.py': 3, 'cli/plc/watch.py': 2,
-        'ports/trace.py': 1, 'readings.py': 2, 'ros/bridge/session.py': 1,
-        'ros/process/main.py': 1, 'ros/topics/services.py': 1, 'ros/topics/snapshot.py': 1,
-        'ros/topics/writes.py': 1}
+        'cli/monitor/node.py': 1, 'cli/plc/log_file.py': 1, 'cli/plc/reading.py': 1,
+        'cli/plc/verbs/clock.py': 3, 'ports/trace.py': 1, 'readings.py': 2,
+        'ros/bridge/session.py': 1, 'ros/process/main.py': 1, 'ros/topics/services.py': 1,
+        'ros/topics/snapshot.py': 1, 'ros/topics/writes.py': 1}
 
 
 def test_dataclasses_have_slots_and_are_frozen_unless_a_field_is_assigned() -> None:

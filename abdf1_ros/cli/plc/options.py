@@ -152,7 +152,7 @@ def _add_choice(group: argparse._ArgumentGroup, name: str, kind: type[Enum],
                        choices=[*values.values()], help=text)
 
 
-def add_addresses(parser: argparse.ArgumentParser) -> None:
+def add_addresses(parser: argparse.ArgumentParser, has_radix: bool = True) -> None:
     """Add addresses to read, and the options of line and data."""
     add_data_options(parser)
     parser.add_argument('addresses', metavar='ADDRESS', nargs='*',
@@ -165,8 +165,19 @@ def add_addresses(parser: argparse.ArgumentParser) -> None:
                         help='a map CSV; its tags are shown beside the addresses')
     parser.add_argument('--record', metavar='FILE', type=expanded,
                         help='record all bytes of the line in a capture file, for "sniff"')
-    parser.add_argument('--radix', type=str.lower, choices=tuple(RADIXES), default='dec',
-                        help='number base of whole numbers (default: %(default)s)')
+    parser.set_defaults(radix='dec')
+    if has_radix:
+        parser.add_argument('--radix', type=str.lower, choices=tuple(RADIXES), default='dec',
+                            help='number base of whole numbers (default: %(default)s)')
+
+
+def add_repetition(parser: argparse.ArgumentParser) -> None:
+    """Add the options of reads that are repeated."""
+    parser.add_argument('--period', default=0.5, metavar='S',
+                        type=number_option('seconds from 0 to 60; 0.5 is 500 ms', 0, 60),
+                        help='s between reads of addresses and of rows without Period, up to 60 '
+                             '(default: %(default)s)')
+    parser.add_argument('--count', type=COUNT, metavar='N', help='end after N reads')
 
 
 def stations_option(text: str, right: str = '') -> tuple[int, ...]:

@@ -34,7 +34,7 @@ exit status:
   2    wrong options, files, addresses or values; a write not confirmed with --yes. Nothing was
        written
   3    a write without a reply, or interrupted: the PLC may have all, a part or nothing of it
-  130  interrupted by Ctrl-C; a running watch or ping ends with 0 or 1 instead
+  130  interrupted by Ctrl-C; a running watch, log or ping ends with 0 or 1 instead
 """
 _EPILOG = _STATUSES + """
 examples:
@@ -49,13 +49,15 @@ examples:
   plc write F8:2 -1.5e3 --station 1 --yes --net net.csv
   plc watch B3:0 N7:0 T4:0.ACC --net net.csv
   plc watch --map map.csv --net net.csv
+  plc log --map map.csv --net net.csv --to shift.csv
+  plc plot shift.csv --html shift.html        curves of a log, for a browser
 
 "plc COMMAND --help" explains each command.
 """
 
 # The order of the help. A verb that is not named here comes after these.
-_ORDER = ('read', 'write', 'watch', 'status', 'ping', 'scan', 'detect', 'init', 'files', 'import',
-          'clock', 'ports')
+_ORDER = ('read', 'write', 'watch', 'log', 'plot', 'status', 'ping', 'scan', 'detect', 'init',
+          'files', 'import', 'clock', 'ports')
 
 
 @cache

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import TypeVar
 
@@ -26,7 +26,6 @@ from abdf1_ros.df1.stations import ActiveStationList, MAX_STATION
 from abdf1_ros.errors import Abdf1Error, PortLost
 from abdf1_ros.pccc.dialect import Steps
 from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.ports.descriptor import Port
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.settings.network import Network
 
@@ -36,7 +35,7 @@ complain = partial(tell, 'plc', code=RED)
 """Print a text about a failure on standard error."""
 
 
-def opened(network: Network) -> Callable[[], Port]:
+def opened(network: Network) -> open_line.OpenedPort:
     """Open the port of ``network``; NoPort when that fails."""
     try:
         return open_line.OpenedPort(PortSettings.of(network))

@@ -16,38 +16,20 @@
 
 from __future__ import annotations
 
-from collections import Counter, defaultdict, deque
+from collections import defaultdict, deque
 from collections.abc import Callable, Collection, Iterator, Sequence
-from dataclasses import dataclass
-from datetime import datetime
-from functools import partial
 import math
-import random
 import shutil
 import sys
 import textwrap
-from typing import NamedTuple
 
-from abdf1_ros.cli.plc.data import labels, Radix, rows, tag_of, Tags, value_texts
-from abdf1_ros.cli.plc.session import opened
+from abdf1_ros.cli.plc.data import labels, Radix, rows, Tags, value_texts
+from abdf1_ros.cli.plc.reading import NoValue, RepeatedReads, WatchedRead
 from abdf1_ros.cli.terminal import is_terminal, table, tell
-from abdf1_ros.df1.stations import Station
-from abdf1_ros.driver.driver import Driver
-from abdf1_ros.driver.settings import DriverSettings
-from abdf1_ros.open_line import traced
 from abdf1_ros.pccc.values import Values
-from abdf1_ros.ports.link_thread import LinkThread
-from abdf1_ros.ports.settings import PortSettings
-from abdf1_ros.ports.wake import Wake
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.text import bar, BARS, counted, cut, printable
-
-# Period (ms) to show ages and errors again without new values.
-_GLANCE = 250
-
-# Most values that wait to be shown; older values are dropped and counted.
-MAX_NEWS = 1000
 
 # Period (s) of questions for the mode of a PLC.
 _MODE_PERIOD = 3.0
@@ -63,155 +45,45 @@ _CURVE = 24
 _VALUE_AND_CURVE = f'value, and its last {_CURVE} reads'
 
 
-@dataclass(frozen=True, slots=True)
-class NoValue:
-    """The reason for a missing value."""
-
-    error: str
-
-
-class WatchedRead(NamedTuple):
-    """The result of a read, with its time."""
-
-    when: datetime
-    mapping: Mapping
-    what: Values | NoValue
-
-
-class LiveValues:
+class LiveValues(RepeatedReads):
     """
-    The driver without ROS: read ``mappings`` every ``period`` seconds and show them.
+    Show the values of ``mappings``; ``tags`` are shown beside the addresses.
 
-    With ``csv`` each read prints a line per value, also without a change. ``tags`` are shown
-    beside the addresses. On a terminal the mode of each PLC is shown above the values. All bytes
-    go into the capture ``record``.
-
-    This class is the driver's ``Listener``; ``counters`` are the counters of the line. Raises
-    OSError if the port cannot be opened.
+    On a terminal the mode of each PLC is shown above the values.
     """
 
     def __init__(self, network: Network, mappings: Sequence[Mapping], period: float,
-                 radix: Radix = Radix.DECIMAL, csv: bool = False, tags: Tags | None = None,
+                 radix: Radix = Radix.DECIMAL, tags: Tags | None = None,
                  record: str | None = None) -> None:
-        self._csv = csv
-        self._mappings = mappings
+        self._is_live = is_terminal(sys.stdout)
         self._radix = radix
-        self._tags = tags
         self._names = {mapping: labels(mapping, tags) for mapping in mappings}
         self._changed: dict[Mapping, float] = {}
         self._past: dict[Mapping, deque[float]] = defaultdict(lambda: deque(maxlen=_CURVE))
-        settings = DriverSettings(
-            default_period=period, read_only=True, first_tns=random.randrange(0x10000),
-            processor_period=_MODE_PERIOD if is_terminal(sys.stdout) and not csv else 0.0)
-        self._driver = Driver(network, mappings, settings, self)
-        self.counters = self._driver.counters
-        port, self._trace = opened(network), None
-        if record is not None:
-            port, self._trace = traced(record, PortSettings.of(network), network.error_code,
-                                       network.duplex, port, partial(tell, 'plc'))
-        self._link = LinkThread(self._driver.machine, port)
-        self._news: deque[WatchedRead] = deque(maxlen=MAX_NEWS)
-        self._lost = self._lost_reported = 0
-        self._has_news = Wake()  # not an Event: an interrupt in it may leave its lock locked
-        self._reads: Counter[Mapping] = Counter()
         self._shown: dict[Mapping, Values | NoValue] = {}
         self._height = 0
         self._size: tuple[int, int] | None = None
+        super().__init__(network, mappings, period, record,
+                         processor_period=_MODE_PERIOD if self._is_live else 0.0)
 
-    def run(self, count: int | None) -> int:
-        """
-        Show values until each address has been read ``count`` times, or KeyboardInterrupt.
-
-        A failed read counts too. Returns the number of addresses without a value at the end.
-        """
-        if self._csv:
-            print(f'time,station,address,{"" if self._tags is None else "tag,"}value', flush=True)
-        try:
-            self._link.start()  # inside the try block: the thread would keep the process alive
-            while not self._link.has_failed and not self._is_done(count):
-                self._has_news.wait(_GLANCE)
-                self._has_news.take()
-                self.show()
-            self.show()
-        except KeyboardInterrupt:
-            pass
-        finally:
-            # Count before the stop, because the end of the line causes more errors.
-            failed = sum(self._driver.points[mapping].error is not None
-                         for mapping in self._mappings)
-            self._link.stop()
-            self._has_news.close()
-            if self._trace is not None:
-                self._trace.close()
-        return failed
-
-    def read(self, mapping: Mapping, values: Values) -> None:
-        """Record the values of a read; called in the link thread."""
-        self._lost += len(self._news) == MAX_NEWS
-        self._news.append(WatchedRead(datetime.now(), mapping, values))
-        self._reads[mapping] += 1
-        self._has_news.set()
-
-    def unreadable(self, *args: object) -> None:
-        """Do nothing: the point has the reason, and no other event can happen here."""
-
-    published_again = written = foreign_value = happened = unreadable
-
-    def station_changed(self, station: Station) -> None:
-        """Wake the thread that shows the news."""
-        self._has_news.set()
-
-    def _is_done(self, count: int | None) -> bool:
-        if count is None:
-            return False
-        points = self._driver.points
-        return all(self._reads[mapping] + points[mapping].failures >= count
-                   for mapping in self._mappings)
-
-    def show(self) -> None:
-        changed: list[WatchedRead] = []
-        while self._news:
-            changed.append(self._news.popleft())
-        is_live = is_terminal(sys.stdout) and not self._csv
-        if (lost := self._lost - self._lost_reported) and not is_live:
-            self._lost_reported += lost
-            tell('plc', f'{counted(lost, "read")} lost: this output was too slow')
-        for mapping in self._mappings:
-            error = self._driver.points[mapping].error
-            if error is not None:
-                changed.append(WatchedRead(datetime.now(), mapping, NoValue(error)))
-        if self._csv:
-            self._print_csv(changed)
-        elif is_live:
-            self.note_changes(changed)
+    def show(self, news: Sequence[WatchedRead], lost: int) -> None:
+        """Draw the table again, or print what has changed."""
+        if self._is_live:
+            self.note_changes(news)
             self.redraw()
-        else:
-            self._print(changed)
+            return
+        if lost:
+            tell('plc', lost_reads(lost))
+        self._print(news)
 
     def _print(self, changed: Sequence[WatchedRead]) -> None:
         """Print the rows of each mapping that changed since the last call."""
         for when, mapping, what in changed:
             if mapping not in self._shown or self._shown[mapping] != what:
                 self._shown[mapping] = what
-                time = when.isoformat(timespec='milliseconds').partition('T')[2]
+                time = when.time().isoformat(timespec='milliseconds')
                 for address, text in self._rows(mapping):
                     print(f'{time}  {address}  {text}', flush=True)
-
-    def _print_csv(self, news: Sequence[WatchedRead]) -> None:
-        """Print each value with date, time and address; empty for a read that has failed."""
-        for when, mapping, what in news:
-            time = when.isoformat(timespec='milliseconds')
-            if isinstance(what, NoValue) and self._shown.get(mapping) == what:
-                continue  # print a failure once only
-            self._shown[mapping] = what
-            texts = [''] if isinstance(what, NoValue) else \
-                [_quoted(printable(what))] if isinstance(what, str) else \
-                value_texts(mapping, what, self._radix)
-            for number, text in enumerate(texts):
-                place = str(mapping.place_of(number))
-                tag = [] if self._tags is None else [
-                    _quoted(tag_of(mapping, number, self._tags))]
-                print(time, mapping.station, place, *tag, text, sep=',', flush=True)
 
     def note_changes(self, news: Sequence[WatchedRead]) -> None:
         """Record the values to show, and the times of their last changes."""
@@ -319,9 +191,9 @@ def _with_descriptions(titles: Sequence[str], cells: Sequence[tuple[str, ...]],
     return table((*titles, title), cells, right=(1, 3)).split('\n')
 
 
-def _quoted(text: str) -> str:
-    """Return a text as a cell of CSV."""
-    return '"' + text.replace('"', '""') + '"'
+def lost_reads(count: int) -> str:
+    """Return how many reads were dropped as text."""
+    return f'{counted(count, "read")} lost: this output was too slow'
 
 
 def curve_of(numbers: Collection[float], text: Callable[[float], str]) -> str:

@@ -26,10 +26,10 @@ import os
 from pathlib import Path
 import re
 import threading
-from unittest.mock import Mock
 
 from abdf1_ros.cli.plc.data import mapping_of, Radix, Tags
-from abdf1_ros.cli.plc.watch import curve_of, LiveValues, NoValue, WatchedRead
+from abdf1_ros.cli.plc.reading import NoValue, WatchedRead
+from abdf1_ros.cli.plc.watch import curve_of, LiveValues
 from abdf1_ros.driver.checks import Checks, StationHealth
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity, Mode
@@ -97,54 +97,14 @@ def test_what_stays_is_shown_once(plcs: Plcs, capsys: Output) -> None:
     assert sorted(shown(capsys)) == ['N7:0  0', "ST9:0  'Tank'"]
 
 
-# Each on a line of its own: after a watch that ends with a command under way its reply may come.
-@pytest.mark.parametrize(('tags', 'title', 'first', 'other'), [
-    (None, '', '', ''), ({}, 'tag,', '"",', '"",'), ({'N7:0': 'a, b'}, 'tag,', '"a, b",', '"",')])
-def test_each_read_is_a_line_of_csv_for_each_value(
-        plcs: Plcs, capsys: Output, tags: Tags | None, title: str, first: str, other: str) -> None:
-    store(plcs[1], 'ST9:0', 'a,"b"')
-    cells = {'Command': 'Read', 'Station': '1', 'PLC_Type': 'PLC5'}
-    words, name = mapping_of('N7:0-1', cells), mapping_of('ST9:0', cells | {'Period': '100'})
-    assert LiveValues(network_on(plcs), [words, name], 0.01, csv=True, tags=tags).run(2) == 0
-    head, *lines = capsys.readouterr().out.splitlines()
-    assert head == f'time,station,address,{title}value'
-    told = [line.partition(',')[2] for line in lines]
-    assert told.count(f'1,N7:0,{first}0') == told.count(f'1,N7:1,{other}0') >= 2
-    assert told.count(f'1,ST9:0,{other}"a,""b"""') >= 2
-
-
-def test_reads_that_the_output_does_not_take_are_counted_and_others_keep_their_times(
+def test_reads_that_the_output_does_not_take_are_counted(
         plcs: Plcs, capsys: Output, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr('abdf1_ros.cli.plc.watch.MAX_NEWS', 2)
-    moments = (NOW.replace(second=number) for number in range(60))
-    monkeypatch.setattr('abdf1_ros.cli.plc.watch.datetime', Mock(now=lambda: next(moments)))
-    watch = LiveValues(network_on(plcs), [SPEED], 0.01, csv=True)
+    monkeypatch.setattr('abdf1_ros.cli.plc.reading.MAX_NEWS', 2)
+    watch = LiveValues(network_on(plcs), [SPEED], 0.01)
     for value in range(5):
         watch.read(SPEED, array('h', [value]))
-    watch.show()
-    said, told = capsys.readouterr()
-    assert told == 'plc: 3 reads lost: this output was too slow\n'
-    watch.show()
-    assert capsys.readouterr() == ('', '')
-    for lost in (1, 2):  # since the last call each
-        for value in range(lost + 2):
-            watch.read(SPEED, array('h', [value]))
-        watch.show()
-        assert capsys.readouterr().err.startswith(f'plc: {lost} read{"s"[:lost - 1]} lost: ')
-    assert said == ''.join(
-        f'2026-03-01T00:00:0{value}.000,1,N7:0,{value}\n' for value in (3, 4))
-
-
-def test_read_that_fails_is_a_line_of_csv_without_a_value(plcs: Plcs, capsys: Output) -> None:
-    plcs.say('silent 1')
-    watch = LiveValues(network_on(plcs, 100), [SPEED], 0.01, csv=True)
-    assert watch.run(2) == 1
-    for value in (7, 8):  # it answers for a moment
-        watch.read(SPEED, array('h', [value]))
-        watch.show()
-        watch.show()
-    assert [line.partition(',')[2] for line in capsys.readouterr().out.splitlines()[1:]] == [
-        f'1,N7:0,{value}' for value in ('', 7, '', 8, '')]
+    watch.show([], 3)
+    assert capsys.readouterr().err == 'plc: 3 reads lost: this output was too slow\n'
 
 
 def test_control_characters_of_a_plc_do_not_reach_the_screen(plcs: Plcs, capsys: Output) -> None:
@@ -180,7 +140,7 @@ def test_interrupt_of_the_start_leaves_no_thread(
             super().start()
             raise KeyboardInterrupt
 
-    monkeypatch.setattr('abdf1_ros.cli.plc.watch.LinkThread', Interrupted)
+    monkeypatch.setattr('abdf1_ros.cli.plc.reading.LinkThread', Interrupted)
     watch = LiveValues(network_on(plcs), [SPEED], 0.01)
     with suppress(KeyboardInterrupt):
         watch.run(1)
@@ -198,7 +158,7 @@ def draw(monkeypatch: pytest.MonkeyPatch) -> Draw:
                  tags: Tags | None = None, radix: Radix = Radix.DECIMAL) -> list[str]:
         screen = io.TextIOWrapper(io.BytesIO(), encoding, errors='backslashreplace')
         with monkeypatch.context() as patch:
-            patch.setattr('abdf1_ros.cli.plc.watch.opened', lambda network: None)
+            patch.setattr('abdf1_ros.cli.plc.reading.opened', lambda network: None)
             watch = LiveValues(Network(), mappings, 0.01, radix, tags=tags)
             patch.setattr('sys.stdout', screen)
             patch.setattr('shutil.get_terminal_size', lambda: os.terminal_size(size))
@@ -239,7 +199,7 @@ class Screen:
 def test_nothing_old_stays_below_a_table_that_shrinks(
         monkeypatch: pytest.MonkeyPatch, capsys: Output) -> None:
     screen = Screen('$ plc watch N7:0 C5:0.ACC')
-    monkeypatch.setattr('abdf1_ros.cli.plc.watch.opened', lambda network: None)
+    monkeypatch.setattr('abdf1_ros.cli.plc.reading.opened', lambda network: None)
     rows = SPEED, make_mapping('C5:0.ACC', item=2)
 
     def show(size: tuple[int, int], *news: tuple[Mapping, Values | NoValue]) -> list[str]:

@@ -28,28 +28,28 @@ from functools import partial
 
 from abdf1_ros.cli.plc import presence
 from abdf1_ros.cli.plc.asking import ask, mappings_of
-from abdf1_ros.cli.plc.options import add_addresses, COUNT, RADIXES
+from abdf1_ros.cli.plc.log import log_values
+from abdf1_ros.cli.plc.log_file import FORMS, LogOutput
+from abdf1_ros.cli.plc.options import add_addresses, add_repetition, RADIXES
 from abdf1_ros.cli.plc.session import complain, Session
 from abdf1_ros.cli.plc.targets import Targets, to_read
 from abdf1_ros.cli.plc.watch import LiveValues
-from abdf1_ros.cli.terminal import EXIT_FAILED, number_option
+from abdf1_ros.cli.terminal import EXIT_FAILED
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments."""
     add_addresses(parser)
-    parser.add_argument('--period', default=0.5, metavar='S',
-                        type=number_option('seconds from 0 to 60; 0.5 is 500 ms', 0, 60),
-                        help='s between reads of addresses and of rows without Period, up to 60 '
-                             '(default: %(default)s)')
+    add_repetition(parser)
     parser.add_argument('--csv', action='store_true',
-                        help='print each value as time,station,address,value')
-    parser.add_argument('--count', type=COUNT, metavar='N', help='end after N reads')
+                        help='print each read as "plc log" does')
 
 
 def run(options: argparse.Namespace) -> int:
     """Read the addresses again and again, and show their values."""
     targets = to_read(options)
+    if options.csv:
+        return log_values(options, targets, LogOutput(FORMS['csv']))
     return ask(options, partial(_watch, targets=targets), targets)
 
 
@@ -57,7 +57,7 @@ def _watch(options: argparse.Namespace, session: Session, targets: Targets) -> i
     mappings = mappings_of(options, session, targets)
     session.close()  # the driver opens the port itself
     watch = LiveValues(session.network, mappings, options.period, RADIXES[options.radix],
-                       options.csv, targets.tags, options.record)
+                       targets.tags, options.record)
     failed = watch.run(options.count)
     if failed:
         complain(presence.traffic(watch.counters))

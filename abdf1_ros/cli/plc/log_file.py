@@ -1,0 +1,311 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The rows of ``plc log``: their forms, and a file that is continued.
+
+A row is one value, or the reason why there is none: time with UTC offset, station, address, tag,
+value, reason. The first value after a gap has a reason too, which begins with "answers again" or
+"heard again". A row without a station is about all addresses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from dataclasses import dataclass
+from datetime import datetime, timedelta, UTC
+from enum import Enum
+import errno
+import fcntl
+import json
+import os
+import re
+import stat
+import sys
+from typing import NamedTuple
+
+from abdf1_ros.cli.terminal import drop_output, reason_of
+from abdf1_ros.problems import ConfigurationError, Problem
+from abdf1_ros.text import shown
+
+COLUMNS = 'time', 'station', 'address', 'tag', 'value', 'reason'
+
+_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+_CONTINUED = 'the log goes on'
+
+# Most bytes of a last line that are looked at: no row is longer.
+_LONGEST_ROW = 65536
+
+_MEASUREMENT = 'plc'
+
+
+class Cell(Enum):
+    """What a row has as its value; the value is the name of the field in line protocol."""
+
+    INTEGER = 'integer'
+    FLOAT = 'float'
+    TEXT = 'text'
+    NONE = ''
+
+
+class LogRow(NamedTuple):
+    """One value as ``text``, or a ``reason`` why there is none; ``when`` has a UTC offset."""
+
+    when: datetime
+    station: int | None
+    address: str
+    tag: str
+    cell: Cell
+    text: str
+    reason: str = ''
+
+
+@dataclass(frozen=True, slots=True)
+class LogForm:
+    """
+    A form of the rows.
+
+    - ``head``: the first line of a file, empty for none.
+    - ``line``: the line of a row.
+    - ``first_line``: what the first line of such a file looks like.
+    """
+
+    head: str
+    line: Callable[[LogRow], str]
+    first_line: re.Pattern[str]
+
+
+def _csv_line(row: LogRow) -> str:
+    value = _quoted(row.text) if row.cell is Cell.TEXT else row.text
+    return ','.join((_time(row), '' if row.station is None else str(row.station), row.address,
+                     row.tag and _quoted(row.tag), value, row.reason and _quoted(row.reason)))
+
+
+def _quoted(text: str) -> str:
+    return '"' + text.replace('"', '""') + '"'
+
+
+def _time(row: LogRow) -> str:
+    return row.when.isoformat(timespec='milliseconds')
+
+
+def _json_line(row: LogRow) -> str:
+    number, reason = _finite(row)
+    value = row.text if row.cell is Cell.TEXT else None if number is None else \
+        int(number) if row.cell is Cell.INTEGER else float(number)
+    return json.dumps(dict(zip(COLUMNS, (
+        _time(row), row.station, row.address, row.tag, value, reason), strict=True)),
+        ensure_ascii=False)
+
+
+def _finite(row: LogRow) -> tuple[str | None, str]:
+    """Return the number of a row, None for none, and its reason: no form but CSV has NaN."""
+    if row.cell is Cell.FLOAT and row.text.lstrip('-') in ('nan', 'inf'):
+        return None, row.reason or f'the value is {row.text}'
+    return (row.text if row.cell in (Cell.INTEGER, Cell.FLOAT) else None), row.reason
+
+
+def _line_protocol(row: LogRow) -> str:
+    """
+    Return a point of InfluxDB's line protocol.
+
+    A field of InfluxDB keeps its type for all series, so each type has a field of its own.
+    """
+    number, reason = _finite(row)
+    tags = [('station', '' if row.station is None else str(row.station)),
+            ('address', row.address), ('tag', row.tag)]
+    fields = []
+    if row.cell is Cell.TEXT:
+        fields.append(f'{row.cell.value}={_field_text(row.text)}')
+    elif number is not None:
+        fields.append(f'{row.cell.value}={number}{"i" * (row.cell is Cell.INTEGER)}')
+    if reason:
+        fields.append(f'reason={_field_text(reason)}')
+    series = ''.join(f',{name}={_tag_text(text)}' for name, text in tags if text)
+    nanoseconds = (row.when - _EPOCH) // timedelta(microseconds=1) * 1000
+    return f'{_MEASUREMENT}{series} {",".join(fields)} {nanoseconds}'
+
+
+def _field_text(text: str) -> str:
+    return '"' + text.replace('\\', r'\\').replace('"', r'\"') + '"'
+
+
+def _tag_text(text: str) -> str:
+    # A backslash at the end would escape the comma or blank after it.
+    return re.sub('([,= ])', r'\\\1', text + ' ' * text.endswith('\\'))
+
+
+_HEAD = ','.join(COLUMNS)
+
+FORMS = {
+    'csv': LogForm(_HEAD, _csv_line, re.compile(re.escape(_HEAD))),
+    'jsonl': LogForm('', _json_line, re.compile(r'\{"time": ".*"reason": ".*"\}')),
+    'influx': LogForm('', _line_protocol, re.compile(rf'{_MEASUREMENT}[, ].* \d+')),
+}
+
+
+class LogLost(Exception):
+    """The log cannot be written any more; the text says why, and how much is in it."""
+
+
+class LogOutput:
+    """The log on standard output; a file that ``>>`` continues keeps its one head."""
+
+    def __init__(self, form: LogForm) -> None:
+        self._form = form
+        self._count = 0
+        self._is_continued = _is_our_output(form)
+
+    def begin(self) -> None:
+        """Write what stands before the first row."""
+        if self._is_continued:
+            self._put(self._form.line(_continued()))
+        elif self._form.head:
+            self._put(self._form.head)
+
+    def write(self, rows: Iterable[LogRow]) -> None:
+        """Write rows; raises LogLost, and BrokenPipeError if the reader has left."""
+        if lines := [*map(self._form.line, rows)]:
+            self._put('\n'.join(lines))
+            self._count += len(lines)
+
+    def _put(self, text: str) -> None:
+        try:
+            print(text, flush=True)
+        except BrokenPipeError:
+            raise
+        except OSError as error:
+            drop_output()
+            raise LogLost(_lost('the output', error, self._count)) from None
+
+    def close(self) -> None:
+        """Do nothing: the output stays open."""
+
+
+def _is_our_output(form: LogForm) -> bool:
+    """Return True if standard output is a file that already begins as ours do."""
+    with suppress(OSError, ValueError):
+        status = os.fstat(sys.stdout.fileno())
+        if stat.S_ISREG(status.st_mode) and status.st_size:
+            with open(f'/proc/self/fd/{sys.stdout.fileno()}', 'rb') as file:
+                return bool(form.first_line.fullmatch(_first_line(file.read(_LONGEST_ROW))))
+    return False
+
+
+def _continued() -> LogRow:
+    return LogRow(datetime.now().astimezone(), None, '', '', Cell.NONE, '', _CONTINUED)
+
+
+def _first_line(data: bytes) -> str:
+    return data.partition(b'\n')[0].decode('utf-8', 'replace').rstrip('\r')
+
+
+def _lost(name: str, error: OSError, count: int) -> str:
+    return f'{reason_of(name, error)}; the log ends here, after {count} rows of this run'
+
+
+class LogFile:
+    """
+    A log on the disk that is continued, row by row.
+
+    It never has half a row: the rest of one, after a power failure, is removed, and ``remark``
+    says so. Raises ConfigurationError if the file is not a log of this form, if another program
+    writes to it, or if it cannot be opened.
+    """
+
+    def __init__(self, path: str, form: LogForm) -> None:
+        self._path = path
+        self._form = form
+        self._count = self._size = 0
+        self.remark = ''
+        self._is_new = not os.path.exists(path)
+        try:
+            self._is_regular = self._is_new or os.path.isfile(path)
+            flags = os.O_RDWR | os.O_CREAT | os.O_APPEND if self._is_regular else os.O_WRONLY
+            # not for every user: it holds the values of a plant
+            self._file = os.open(path, flags | os.O_CLOEXEC, 0o640)
+        except OSError as error:
+            raise ConfigurationError([Problem('--to', reason_of(path, error))]) from None
+        if self._is_regular:
+            try:
+                self._check()
+            except (ConfigurationError, OSError) as error:
+                os.close(self._file)
+                if isinstance(error, OSError):
+                    error = ConfigurationError([Problem('--to', reason_of(path, error))])
+                raise error from None
+
+    def _check(self) -> None:
+        """Lock the file, and cut off the rest of a row at its end."""
+        try:
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            if error.errno == errno.EWOULDBLOCK:  # not every network file system has locks
+                raise self._fault('is being written by another program') from None
+        self._size = os.fstat(self._file).st_size
+        head = os.pread(self._file, _LONGEST_ROW, 0)
+        if b'\n' not in head and self._form.head.encode().startswith(head.rstrip(b'\r\0')):
+            self._size = 0
+        elif not self._form.first_line.fullmatch(_first_line(head)):
+            raise self._fault(f'is not a log of this form: it begins with '
+                              f'"{shown(_first_line(head))}"')
+        else:
+            self._size = self._end_of_rows()
+        os.ftruncate(self._file, self._size)
+
+    def _end_of_rows(self) -> int:
+        """Return the size without the rest of a row."""
+        start = max(0, self._size - _LONGEST_ROW)
+        rest = os.pread(self._file, _LONGEST_ROW, start).rpartition(b'\n')[2]
+        if len(rest) > self._size - start - 1:
+            raise self._fault('has no line end in its last 64 kB')
+        if rest:
+            self.remark = (f'{self._path}: removed the rest of a row that was not written to its '
+                           f'end: "{shown(rest.decode("utf-8", "replace"))}"')
+        return self._size - len(rest)
+
+    def _fault(self, text: str) -> ConfigurationError:
+        return ConfigurationError([Problem('--to', f'{self._path} {text}; give another name')])
+
+    def begin(self) -> None:
+        """Write what stands before the first row of this run."""
+        if self._size:
+            self._put(self._form.line(_continued()))
+        elif self._form.head:
+            self._put(self._form.head)
+
+    def write(self, rows: Iterable[LogRow]) -> None:
+        """Write rows; raises LogLost."""
+        if lines := [*map(self._form.line, rows)]:
+            self._put('\n'.join(lines))
+            self._count += len(lines)
+
+    def _put(self, text: str) -> None:
+        left = data = f'{text}\n'.encode()
+        try:
+            while left:
+                left = left[os.write(self._file, left):]
+        except OSError as error:
+            if self._is_regular:
+                os.ftruncate(self._file, self._size)  # half a row would mean another value
+            raise LogLost(_lost(self._path, error, self._count)) from None
+        self._size += len(data)
+
+    def close(self) -> None:
+        """Close the file; remove it if it is new and nothing was written to it."""
+        os.close(self._file)
+        if self._is_new and not self._size:
+            with suppress(OSError):
+                os.unlink(self._path)

@@ -1,0 +1,54 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Log values to a file that is continued: each read, and the reason of each gap.
+
+  plc log --map map.csv --net net.csv --to shift.csv
+  plc log N7:0-3 B3:0/2 --period 1 --net net.csv --to shift.csv
+  plc log --map map.csv --net net.csv --format jsonl | jq .value
+"""
+
+from __future__ import annotations
+
+import argparse
+
+from abdf1_ros.cli.plc.log import log_values
+from abdf1_ros.cli.plc.log_file import FORMS, LogFile, LogOutput
+from abdf1_ros.cli.plc.options import add_addresses, add_repetition
+from abdf1_ros.cli.plc.session import complain
+from abdf1_ros.cli.plc.targets import to_read
+from abdf1_ros.paths import expanded
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments."""
+    add_addresses(parser, has_radix=False)
+    add_repetition(parser)
+    parser.add_argument('--to', metavar='FILE', type=expanded,
+                        help='the file, new or of an earlier "plc log" (default: standard output)')
+    parser.add_argument('--format', choices=tuple(FORMS), default='csv',
+                        help='csv; jsonl: one JSON object a line; influx: line protocol of '
+                             'InfluxDB (default: %(default)s)')
+
+
+def run(options: argparse.Namespace) -> int:
+    """Log the values of addresses or rows; in Mode Listen those that another master reads."""
+    targets, form = to_read(options), FORMS[options.format]
+    if options.to is None:
+        return log_values(options, targets, LogOutput(form), may_listen=True)
+    file = LogFile(options.to, form)
+    if file.remark:
+        complain(file.remark)
+    return log_values(options, targets, file, may_listen=True)
