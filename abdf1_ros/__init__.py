@@ -48,6 +48,7 @@ The rooms of the package, from the wire up. A room imports only from rooms above
 - ``share``: other programs on the same port
 - ``simulator``, ``sniffer``, ``conform``: simulated PLCs, recorded bytes, cases of the manual
 - ``client``: the library; ``ros``: the node; ``cli``: the commands
+- ``testing``: fixtures of pytest
 """
 
 from __future__ import annotations

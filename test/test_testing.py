@@ -27,11 +27,14 @@ import time
 from typing import Any, BinaryIO
 from unittest.mock import Mock
 
+from abdf1_ros.client import Client
 from abdf1_ros.df1 import frames
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.ros import observer
 from abdf1_ros.ros.topics.messages import latched_qos
-from abdf1_ros.testing import abdf1_cell, Bridge, Observer, PATIENCE, Plcs, SimulatedCell
+from abdf1_ros.testing import abdf1_cell, abdf1_plcs
+from abdf1_ros.testing.cell import Bridge, Observer, PATIENCE, SimulatedCell
+from abdf1_ros.testing.plcs import Plcs
 import pytest
 from rcl_interfaces.srv import GetParameters
 from rclpy.node import Node
@@ -43,7 +46,7 @@ from support.scripted_line import ScriptedLine
 EXAMPLE = SOURCE / 'examples' / 'testing'
 TUTORIAL = (SOURCE / 'docs' / 'tutorials' / 'testing.md').read_text(encoding='utf-8')
 
-__all__ = ['abdf1_cell']
+__all__ = ['abdf1_cell', 'abdf1_plcs']
 
 Cells = Callable[..., SimulatedCell]
 START = Bridge.start
@@ -91,9 +94,39 @@ def test_test_of_the_tutorial_passes(abdf1_cell: Cells) -> None:  # noqa: F811
     _run(re.findall(r'```python\n(.*?)```', TUTORIAL, re.DOTALL)[1])['test_pressure'](abdf1_cell)
 
 
+def test_plcs_of_the_tutorial_need_no_ros(tmp_path: Path) -> None:
+    """Also where rclpy is missing; the fixture that needs it says so."""
+    plugin, test = re.findall(r'```python\n(.*?)```', TUTORIAL, re.DOTALL)[::3]
+    (tmp_path / 'conftest.py').write_text(plugin, 'utf-8')
+    (tmp_path / 'test_plcs.py').write_text(
+        f'{test}\n\ndef test_cell(abdf1_cell):\n    pass\n', 'utf-8')
+    said = subprocess.run(
+        [sys.executable, '-c', 'import sys; sys.modules["rclpy"] = None\nimport pytest; '
+         'sys.exit(pytest.main(["-q", "-p", "no:cacheprovider"]))'], cwd=tmp_path, check=False,
+        capture_output=True, text=True, timeout=60).stdout
+    assert '1 passed, 1 error' in said
+    assert re.search(r'abdf1_cell needs ROS 2 \(.*rclpy.*\): is it sourced', said)
+    assert 'Traceback' not in said and 'site-packages' not in said
+
+
+def test_each_line_of_plcs_is_its_own(abdf1_plcs: Callable[..., Plcs]) -> None:  # noqa: F811
+    data = 'Station,PLC_Type,Address,Length,Values\n{0},SLC,N7:0,2,{0}\n'
+    lines = [abdf1_plcs(data.format(station)) for station in (1, 2)]
+    for station, line in enumerate(lines, 1):
+        with line.client(station=station, plc_type='SLC') as plc:
+            assert plc.read('N7:0') == station
+            line.set('N7:1', 7, station=station)
+            assert plc.read('N7:1') == 7
+        files = line.files('Tag,Command,Address,Station,PLC_Type\n'
+                           f'a,ReadWrite,N7:0,{station},SLC\n')
+        with Client.from_files(*files) as plant:
+            plant.write('a', 9)
+        assert line.word('N7:0', station) == 9
+
+
 def test_what_never_happens_is_named(
         abdf1_cell: Cells, monkeypatch: pytest.MonkeyPatch) -> None:  # noqa: F811
-    monkeypatch.setattr('abdf1_ros.testing.PATIENCE', 0.2)
+    monkeypatch.setattr('abdf1_ros.testing.cell.PATIENCE', 0.2)
     cell = abdf1_cell(*SMALL)
     with pytest.raises(AssertionError, match='waited for a word of 7'):
         cell.ros.until(lambda: cell.plcs.word('N7:0') == 7, 'a word of 7')
@@ -168,7 +201,8 @@ def test_log_of_a_bridge_has_all_starts_and_its_end_is_shown(
 
 def test_program_of_a_ladder_runs_in_the_station_that_is_named(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr('abdf1_ros.testing.time', clock := Mock(**{'monotonic.return_value': 9}))
+    clock = Mock(**{'monotonic.return_value': 9})
+    monkeypatch.setattr('abdf1_ros.testing.plcs.time', clock)
     (tmp_path / 'data.csv').write_text(
         'Station,PLC_Type,Address,Length,Motion,Period\n1,SLC,N7:0,2,,\n2,SLC,N7:0,2,,\n'
         '3,SLC,N7:0,3,Ramp,1000\n', 'utf-8')
@@ -188,7 +222,7 @@ def test_program_of_a_ladder_runs_in_the_station_that_is_named(
 def test_gateway_of_the_data_answers_for_its_plcs(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / 'data.csv').write_text('Station,PLC_Type,Address,Via\n1,SLC,N7:0,10\n', 'utf-8')
-    monkeypatch.setattr('abdf1_ros.testing.LinkThread', links := Mock())
+    monkeypatch.setattr('abdf1_ros.testing.plcs.LinkThread', links := Mock())
     (plcs := Plcs(tmp_path / 'data.csv')).lose()
     links.call_args.kwargs['on_fault'](bug := ValueError())
     assert plcs.faults == [bug]
@@ -227,7 +261,7 @@ def test_executor_ends_before_a_node_goes_and_the_context_last(
 
 def test_publisher_asks_its_node_until_one_of_the_questions_is_answered(
         monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr('abdf1_ros.testing.time', Mock(monotonic=count(5).__next__))
+    monkeypatch.setattr('abdf1_ros.testing.cell.time', Mock(monotonic=count(5).__next__))
     never, late = Mock(done=lambda: False), Mock(done=Mock(side_effect=[False, False, True]))
     observer = Mock(until=lambda condition, _: next(filter(None, (condition() for _ in '12345'))))
     observer.meet = partial(Observer.meet, observer)

@@ -101,7 +101,7 @@ ROOMS = (
          'places of installed files; the end after a signal; output without a wait',
          (), is_pure=False),
     Room(('ros',), 'the ROS node: parameters, messages, diagnostics, log', is_pure=False),
-    Room(('testing.py',), 'a pytest fixture: simulated PLCs, a bridge, and a watcher of both',
+    Room(('testing',), 'fixtures of pytest: simulated PLCs; with a bridge and a watcher of both',
          is_pure=False),
     Room(('cli', '__main__.py'), 'the commands, one file or folder each', is_pure=False),
 )

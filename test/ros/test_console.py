@@ -30,7 +30,8 @@ from typing import Any
 
 from abdf1_ros import console
 from abdf1_ros.console import pass_on, Sink
-from abdf1_ros.testing import PATIENCE, Plcs
+from abdf1_ros.testing.cell import PATIENCE
+from abdf1_ros.testing.plcs import Plcs
 import pytest
 from std_msgs.msg import Int16MultiArray
 from support.ptys import full_pipe

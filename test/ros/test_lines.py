@@ -35,7 +35,7 @@ from abdf1_ros.ros.parameters import files
 from abdf1_ros.ros.parameters.files import usable_files
 from abdf1_ros.ros.process import main as process
 from abdf1_ros.signals import EndRequest
-from abdf1_ros.testing import Plcs
+from abdf1_ros.testing.plcs import Plcs
 import pytest
 from rclpy.node import Node
 from rclpy.utilities import get_default_context

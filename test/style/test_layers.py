@@ -26,13 +26,14 @@ from tools.rooms import imports, MODULES, PACKAGE, room_of, ROOMS
 _SANS_IO = {'time', 'threading', 'serial', 'select', 'socket', 'os', 'rclpy'}
 # The shells that wait for signals, input or bytes; only one of them opens a port.
 _WAITING = {'select', 'threading'}
-_MAY_WAIT = ('signals.py', 'testing.py', 'ports/', 'ros/lines.py', 'ros/process/main.py',
+_MAY_WAIT = ('signals.py', 'testing/', 'ports/', 'ros/lines.py', 'ros/process/main.py',
              'ros/callbacks.py', 'ros/parameters/file_watch.py', 'console.py', 'cli/simulator.py',
              'cli/sniff.py', 'open_line.py')
 
 
 def _may_use_ros(module: str) -> bool:
-    return module.startswith(('ros/', 'cli/monitor/')) or module in ('cli/demo.py', 'testing.py')
+    return module.startswith(('ros/', 'cli/monitor/')) or module in (
+        'cli/demo.py', 'testing/cell.py')
 
 
 def _is_ros(top: str) -> bool:

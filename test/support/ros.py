@@ -33,12 +33,12 @@ import threading
 import time
 from typing import Any
 
-from abdf1_ros import testing
 from abdf1_ros.paths import config_file
 from abdf1_ros.ros.bridge.node import BridgeNode, end_together
 from abdf1_ros.ros.bridge.port_owners import PortOwners
 from abdf1_ros.ros.topics.messages import latched_qos
-from abdf1_ros.testing import EVERYTHING, PATIENCE
+from abdf1_ros.testing import cell
+from abdf1_ros.testing.cell import EVERYTHING, PATIENCE
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rcl_interfaces.srv import GetParameters
 from rclpy.clock import Clock, ClockType
@@ -209,7 +209,7 @@ class Process:
         assert 'Traceback' not in self.text, self.text
 
 
-class Inbox(testing.Messages):
+class Inbox(cell.Messages):
     """The messages that a subscription has got, and the events that it has seen."""
 
     def __init__(self, observer: Observer, topic: str) -> None:
@@ -260,7 +260,7 @@ def values_in(message: Any) -> list[float] | str:
     return message.data if isinstance(message.data, str) else list(message.data)
 
 
-class Observer(testing.Observer):
+class Observer(cell.Observer):
     """A ROS node that looks at others from outside; also runs nodes that are added to it."""
 
     def __enter__(self) -> Observer:
@@ -368,7 +368,7 @@ def ros_args(*assignments: str) -> list[str]:
     return ['--ros-args', *(word for text in assignments for word in ('-p', text))]
 
 
-class BridgeCell(testing.SimulatedCell):
+class BridgeCell(cell.SimulatedCell):
     """What ``abdf1_cell`` makes, with the bridge in the executor of ``ros``."""
 
     observer = Observer

@@ -39,7 +39,7 @@ from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.scaling import Scaling
 from abdf1_ros.sniffer.dumps import Recording
-from abdf1_ros.testing import Plcs
+from abdf1_ros.testing.plcs import Plcs
 import pytest
 from support.cases import for_all
 from support.commands import Output

@@ -13,42 +13,31 @@
 # limitations under the License.
 
 """
-Tests of a cell without its PLCs: simulated PLCs, a bridge on their line, and an observer.
+A cell for tests, with ROS: simulated PLCs, a bridge on their line, and an observer of its topics.
 
-``pytest_plugins = ['abdf1_ros.testing']`` in a conftest.py makes the fixture ``abdf1_cell``
-available; see docs/tutorials/testing.md. Importing this module keeps all topics on this machine,
-in a ROS domain that no other session of tests on this machine has.
+Importing this module keeps all topics on this machine, in a ROS domain that no other session of
+tests on this machine has.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack
+from contextlib import contextmanager, ExitStack
 import os
 from pathlib import Path
 import signal
 import subprocess
 import sys
-import threading
 import time
 from typing import TypeVar
 
 from abdf1_ros.cli.check import examine
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.machine import Machine
-from abdf1_ros.df1.slave import multidrop
-from abdf1_ros.pccc.families import parse_address
-from abdf1_ros.ports.endpoints import PtyEndpoint
-from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.ros import observer
 from abdf1_ros.ros.topics.messages import latched_qos
 from abdf1_ros.ros.untyped import RosMessage
-from abdf1_ros.simulator.commands import execute
-from abdf1_ros.simulator.gateway import stations_of
-from abdf1_ros.simulator.ladder import Ladder
-from abdf1_ros.simulator.simulated_plc import load_plcs, SimulatedPlc
-import pytest
+from abdf1_ros.testing.plcs import Plcs
 from rcl_interfaces.srv import GetParameters
 import rclpy
 from rclpy.context import Context
@@ -196,68 +185,6 @@ class Observer(observer.ObservingNode):
         self.node.destroy_client(client)
 
 
-class Plcs:
-    """
-    Simulated PLCs in this process, on a pseudo-terminal; ``data`` is a simulator CSV.
-
-    The name ``port`` disappears with the line. The number of the terminal may soon belong to
-    another test.
-    """
-
-    def __init__(self, data: Path, ladders: Sequence[int] = ()) -> None:
-        self._plcs = load_plcs(str(data), Checksum.CRC, time.monotonic, threading.RLock)
-        for station in ladders:
-            self[station].run_ladder(Ladder(self[station].table))
-        self._line = PtyEndpoint(str(data.with_name('plcs')))
-        self.port = self._line.name
-        self.faults: list[Exception] = []
-        machine = Machine(
-            multidrop(stations_of(self._plcs, Checksum.CRC)), checksum=Checksum.CRC)
-        self.link = LinkThread(machine, self._line.open, on_fault=self.faults.append)
-
-    def __enter__(self) -> Plcs:
-        self.link.start()
-        return self
-
-    def __exit__(self, *exception: object) -> None:
-        if self.link.is_alive():
-            self.lose()
-        assert not self.faults
-
-    def __getitem__(self, station: int) -> SimulatedPlc:
-        for plc in self._plcs:
-            if plc.station == station:
-                return plc
-        raise LookupError(f'there is no station {station}; the data has '
-                          f'{", ".join(str(plc.station) for plc in self._plcs)}')
-
-    def lose(self) -> None:
-        """Take the line away, as when an adapter is unplugged."""
-        self.link.stop()
-        self._line.close()
-
-    def say(self, command: str) -> None:
-        """Carry out a command of the simulator, such as ``delay 1 300`` or ``silent 1``."""
-        execute(command, self._plcs)
-
-    def word(self, address: str, station: int = 1) -> int:
-        """Return a word of a PLC, from 0 to 65535."""
-        self[station].advance()
-        table = self[station].table
-        return int.from_bytes(table.read(parse_address(address, table.plc_type), 1), 'little')
-
-    def set(self, address: str, *words: int, station: int = 1) -> None:  # noqa: A003
-        """Set words of a PLC, as its program does; each from -32768 to 65535."""
-        for word in words:
-            if not -0x8000 <= word <= 0xFFFF:
-                raise ValueError(f'{word} is not a word, from -32768 to 65535')
-        self[station].advance()
-        table = self[station].table
-        with self[station].lock:
-            table.write(parse_address(address, table.plc_type),
-                        b''.join((word & 0xFFFF).to_bytes(2, 'little') for word in words))
-
-
 class SimulatedCell:
     """
     Simulated PLCs, a bridge on their line as a process, and ``ros``, which observes its topics.
@@ -324,16 +251,14 @@ class SimulatedCell:
         return status
 
 
-@pytest.fixture
-def abdf1_cell(tmp_path: Path) -> Iterator[Callable[..., SimulatedCell]]:
-    """
-    Return a function that makes a ``SimulatedCell`` of texts; the cell ends with the test.
-
-    Its context is the default one, so a node of the test needs no context as an argument.
-    """
-    with ExitStack() as stack:
-        if not rclpy.ok():
-            rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
-            stack.callback(rclpy.try_shutdown)
-        yield lambda *texts, **options: stack.enter_context(
-            SimulatedCell(tmp_path, *texts, context=rclpy.get_default_context(), **options))
+@contextmanager
+def default_context() -> Iterator[Context]:
+    """Initialize ROS unless the test has; yield the default context."""
+    if rclpy.ok():
+        yield rclpy.get_default_context()
+        return
+    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        yield rclpy.get_default_context()
+    finally:
+        rclpy.try_shutdown()

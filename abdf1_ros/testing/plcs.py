@@ -1,0 +1,111 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Simulated PLCs in the process of a test, and clients on their line."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+import threading
+import time
+from typing import Any
+
+from abdf1_ros.client import Client
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.machine import Machine
+from abdf1_ros.df1.slave import multidrop
+from abdf1_ros.pccc.families import parse_address
+from abdf1_ros.ports.endpoints import PtyEndpoint
+from abdf1_ros.ports.link_thread import LinkThread
+from abdf1_ros.simulator.commands import execute
+from abdf1_ros.simulator.gateway import stations_of
+from abdf1_ros.simulator.ladder import Ladder
+from abdf1_ros.simulator.simulated_plc import load_plcs, SimulatedPlc
+
+_BAUD = 115200
+
+
+class Plcs:
+    """
+    Simulated PLCs in this process, on a pseudo-terminal; ``data`` is a simulator CSV.
+
+    The name ``port`` disappears with the line. The number of the terminal may soon belong to
+    another test.
+    """
+
+    def __init__(self, data: Path, ladders: Sequence[int] = ()) -> None:
+        self._plcs = load_plcs(str(data), Checksum.CRC, time.monotonic, threading.RLock)
+        for station in ladders:
+            self[station].run_ladder(Ladder(self[station].table))
+        self._folder = data.parent
+        self._line = PtyEndpoint(str(self._folder / 'plcs'))
+        self.port = self._line.name
+        self.faults: list[Exception] = []
+        machine = Machine(
+            multidrop(stations_of(self._plcs, Checksum.CRC)), checksum=Checksum.CRC)
+        self.link = LinkThread(machine, self._line.open, on_fault=self.faults.append)
+
+    def __enter__(self) -> Plcs:
+        self.link.start()
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        if self.link.is_alive():
+            self.lose()
+        assert not self.faults
+
+    def __getitem__(self, station: int) -> SimulatedPlc:
+        for plc in self._plcs:
+            if plc.station == station:
+                return plc
+        raise LookupError(f'there is no station {station}; the data has '
+                          f'{", ".join(str(plc.station) for plc in self._plcs)}')
+
+    def client(self, **arguments: Any) -> Client:
+        """Return a client on the line, with further ``arguments``; ``with`` closes it."""
+        return Client(self.port, duplex='half', baud=_BAUD, **arguments)
+
+    def files(self, rows: str) -> tuple[Path, Path]:
+        """Return a net CSV for the line, and a map CSV with the text ``rows``."""
+        net, mappings = (self._folder / name for name in ('net.csv', 'map.csv'))
+        net.write_text(f'Com_Port,Baud,Timeout\n{self.port},{_BAUD},200\n', encoding='utf-8')
+        mappings.write_text(rows, encoding='utf-8')
+        return net, mappings
+
+    def lose(self) -> None:
+        """Take the line away, as when an adapter is unplugged."""
+        self.link.stop()
+        self._line.close()
+
+    def say(self, command: str) -> None:
+        """Carry out a command of the simulator, such as ``delay 1 300`` or ``silent 1``."""
+        execute(command, self._plcs)
+
+    def word(self, address: str, station: int = 1) -> int:
+        """Return a word of a PLC, from 0 to 65535."""
+        self[station].advance()
+        table = self[station].table
+        return int.from_bytes(table.read(parse_address(address, table.plc_type), 1), 'little')
+
+    def set(self, address: str, *words: int, station: int = 1) -> None:  # noqa: A003
+        """Set words of a PLC, as its program does; each from -32768 to 65535."""
+        for word in words:
+            if not -0x8000 <= word <= 0xFFFF:
+                raise ValueError(f'{word} is not a word, from -32768 to 65535')
+        self[station].advance()
+        table = self[station].table
+        with self[station].lock:
+            table.write(parse_address(address, table.plc_type),
+                        b''.join((word & 0xFFFF).to_bytes(2, 'little') for word in words))
