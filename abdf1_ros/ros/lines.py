@@ -43,8 +43,9 @@ from abdf1_ros.ros.parameters.arguments import Arguments
 from abdf1_ros.ros.parameters.declared import take_given, wrong_names
 from abdf1_ros.ros.parameters.files import node_sections, parameter_files, parameter_tree
 from abdf1_ros.ros.parameters.values import usable
-from abdf1_ros.ros.process.main import EXIT_CONFIGURATION, make_parser, Program, REFUSALS, run_ros
+from abdf1_ros.ros.process.main import EXIT_CONFIGURATION, Program, REFUSALS, run_ros
 from abdf1_ros.ros.process.runner import Line, LinkFailed, Runner
+from abdf1_ros.ros.process.usage import parser_of
 from abdf1_ros.settings.heartbeats import LONGEST_END
 from abdf1_ros.signals import EndRequest
 from abdf1_ros.text import printable
@@ -56,21 +57,6 @@ from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
 NODE_NAME = 'lines'
-
-_USAGE = 'lines --ros-args --params-file lines.yaml'
-
-_HELP = """\
-Run many bridges in one process, a node for each section of the parameter file.
-
-  lines --ros-args --params-file lines.yaml
-  lines --ros-args --params-file lines.yaml -p 'lines:=[/press/abdf1, /paint/abdf1]'
-
-A line whose files have faults is reported and left out; with -p strict_lines:=true the process
-ends instead. After an internal error a line is started again, while all other lines go on.
-
-exit status: 0 after Ctrl-C, SIGTERM or SIGHUP, 2 if parameters are faulty or no line can run,
-1 after internal errors, or if ROS does not start (log directory, network)
-"""
 
 # The parameters of /lines, with their defaults.
 OPTIONS: dict[str, object] = {'lines': [], 'strict_lines': False}
@@ -363,7 +349,7 @@ def main(args: Sequence[str] | None = None) -> int:
     Returns 0 after a signal, 2 if parameters are faulty or no line can run. Returns 1 after
     internal errors, or if ROS does not start for a reason that may pass.
     """
-    return run_ros(NODE_NAME, make_parser(_USAGE, _HELP), _make, args, leaves_out=True)
+    return run_ros(NODE_NAME, parser_of('lines'), _make, args, leaves_out=True)
 
 
 def _allow_files() -> None:

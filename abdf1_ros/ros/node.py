@@ -21,26 +21,9 @@ from collections.abc import Sequence
 from abdf1_ros.ros.bridge.node import BridgeNode
 from abdf1_ros.ros.parameters.arguments import Arguments
 from abdf1_ros.ros.parameters.declared import NODE_NAME
-from abdf1_ros.ros.process.main import make_parser, Program, run_ros
+from abdf1_ros.ros.process.main import Program, run_ros
 from abdf1_ros.ros.process.runner import Line, Runner
-
-_USAGE = 'node --ros-args -p net_file:=net.csv -p map_file:=map.csv'
-
-_HELP = """\
-Read and write the data tables of PLCs over DF1, and show them as topics.
-
-parameters, after --ros-args (docs/reference/parameters.md has all of them):
-  -p net_file:=PATH   CSV with the settings of the line, needed
-  -p map_file:=PATH   CSV with the rows to read and write, needed
-  -p port:=DEVICE     a device path or URL instead of Com_Port in the net file
-
-examples:
-  node --ros-args -p net_file:=net.csv -p map_file:=map.csv
-  node --ros-args --params-file line_1.yaml -r __node:=line_1
-
-exit status: 0 after Ctrl-C, SIGTERM or SIGHUP, 2 for faulty files or parameters,
-1 after internal errors, or if ROS does not start (log directory, network)
-"""
+from abdf1_ros.ros.process.usage import parser_of
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -50,7 +33,7 @@ def main(args: Sequence[str] | None = None) -> int:
     Returns 0 after a signal, 2 if parameters or files are faulty. Returns 1 after internal errors,
     or if ROS does not start for a reason that may pass.
     """
-    return run_ros(NODE_NAME, make_parser(_USAGE, _HELP), _make, args)
+    return run_ros(NODE_NAME, parser_of('node'), _make, args)
 
 
 def _make(given: Sequence[str]) -> Program:

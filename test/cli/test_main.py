@@ -180,6 +180,19 @@ def test_module_that_is_missing_is_named(
     assert errors == f'-c: the Python module {module} is missing; {cure}\n'
 
 
+@pytest.mark.parametrize('name', ['node', 'lines'])
+def test_help_of_the_bridge_needs_no_ros(name: str, tmp_path: Path) -> None:
+    program = ('import sys; sys.modules["rclpy"] = None\n'
+               'from abdf1_ros.__main__ import main; sys.exit(main())')
+    for more, status, said, fault in (
+            (['--help'], 0, f'usage: {name} --ros-args', ''),
+            ([], 2, '', f'{name}: the Python module rclpy')):
+        done = subprocess.run([sys.executable, '-c', program, name, *more], check=False,
+                              capture_output=True, text=True, timeout=PATIENCE)
+        assert (done.returncode, done.stdout[:len(said)], done.stderr[:len(fault)]) == (
+            status, said, fault)
+
+
 @pytest.mark.parametrize('name', sorted(COMMANDS))
 def test_every_command_tells_its_version_and_what_it_takes(
         name: str, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -34,7 +34,6 @@ import time
 from typing import Protocol
 
 from abdf1_ros.console import Console
-from abdf1_ros.paths import ShowVersion
 from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.ros.diagnostics.log import bug_text
 from abdf1_ros.ros.parameters.files import usable_files, with_home
@@ -87,15 +86,6 @@ _ADVICE = (
 _NOT_ENFORCED = (
     'ROS_SECURITY_STRATEGY is not Enforce: if ROS finds no keys, it starts without security, and '
     'any program on the network can write to the PLC')
-
-
-def make_parser(usage: str, description: str) -> argparse.ArgumentParser:
-    """Return the parser for --help and --version; a node has only ROS arguments."""
-    parser = argparse.ArgumentParser(
-        prog=usage.split()[0], usage=usage, description=description,
-        formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--version', action=ShowVersion)
-    return parser
 
 
 class Program(Protocol):
