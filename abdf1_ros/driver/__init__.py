@@ -26,7 +26,7 @@ has the line next. The queues yield jobs (``job_tasks``):
 
 The other modules are
 
-- ``record``: who writes which words.
+- ``flights``: all writes that still say something about words of a PLC.
 - ``served``: the words of our own table, which PLCs read and write.
 - ``requests``: single requests without a map.
 

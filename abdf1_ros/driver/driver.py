@@ -23,7 +23,7 @@ line.
 Where each fact lives:
 
 ==================================================  ============================================
-who writes which words, until when it may land      ``record.WriteRecord``, ``record.OwnWords``
+what may still land, what stands, unread results    ``flights.Flights``, ``flights.Words``
 messages that wait                                  ``writes.queue.WriteQueue.waiting``
 commands of guests that wait                        ``guests.Guest.waiting``
 calls that wait for a read                          ``reads.demands.ReadCalls.waiting``
@@ -56,6 +56,7 @@ from abdf1_ros.df1.stations import ActiveStationList, Station
 from abdf1_ros.df1.tasks import Task
 from abdf1_ros.driver.agenda import Agenda, QUESTION_PERIOD
 from abdf1_ros.driver.checks import Checks
+from abdf1_ros.driver.flights import Flights
 from abdf1_ros.driver.guest_rules import GuestRules
 from abdf1_ros.driver.guests import GuestQueue
 from abdf1_ros.driver.inbox import Inbox
@@ -64,13 +65,11 @@ from abdf1_ros.driver.job_tasks import JobTasks
 from abdf1_ros.driver.overheard import Overheard
 from abdf1_ros.driver.reads.demands import ReadAnswer, ReadCall
 from abdf1_ros.driver.reads.readings import Readings, ValueListener
-from abdf1_ros.driver.record import WriteRecord
 from abdf1_ros.driver.refused import RefusedCommands
 from abdf1_ros.driver.served import Served
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome, show, Write, WriteResult
 from abdf1_ros.driver.writes.queue import MAX_WAITING_WRITES, WriteQueue
-from abdf1_ros.driver.writes.standing import Standing
 from abdf1_ros.driver.writes.under_way import is_message_of, WritesUnderWay
 from abdf1_ros.errors import FormatError, INTERNAL_ERROR, PortLost
 from abdf1_ros.messages import Event
@@ -151,17 +150,17 @@ class Driver:
         """Make the queues of jobs, and the agenda that decides between them."""
         network, settings, machine = self.network, self._settings, self.machine
         report = self._listener.written
-        self._record = record = WriteRecord(
-            machine, 2 * network.cmd_timeout / 1000, self.stations)
+        self._flights = flights = Flights(
+            machine, 2 * network.cmd_timeout / 1000, self.stations, settings.write_timeout, report)
         self.readings = Readings(
-            network, self._active_rows(), settings, self.stations, machine, self._listener, record)
+            network, self._active_rows(), settings, self.stations, machine, self._listener,
+            flights)
         self.points = self.readings.points
         self._demands = self.readings.demands
         self.served = self._make_served()
         self.refused = RefusedCommands(PlcType(network.plc_type))
         writing = WritesUnderWay(
-            self.stations, record, self.readings, settings.write_timeout, report)
-        self._read_backs = writing.read_backs
+            self.stations, flights, self.readings)
         self.spent = writing.spent
         self._writes = WriteQueue(self.stations, writing, settings.write_timeout, report,
                                   self._leave_out, network.timing.tx_delay)
@@ -174,13 +173,12 @@ class Driver:
             self._listener, self._foreign_value, settings.first_tns)
         self.guests = GuestQueue(
             self.stations, machine, network.cmd_timeout / 1000,
-            GuestRules(network, self.mappings, self._processor_of), record, self._fell_silent)
+            GuestRules(network, self.mappings, self._processor_of), flights, self._fell_silent)
         compares = (self.interlocks,) if self.interlocks.heartbeats else ()
-        repeated = [row for row in self.mappings if row.write_again]
-        self._standing = Standing(repeated, settings.write_timeout)
-        stands = (self._standing,) if repeated else ()
-        record.connect((self._read_backs, self.readings.reads, self.interlocks, *stands),
-                       (self._read_backs, *compares, *stands))
+        for row in self.mappings:
+            if row.write_again:
+                flights.words_of(row)
+        flights.connect((self.readings.reads, self.interlocks), (flights, *compares))
         self.tasks = JobTasks(network.station, settings.first_tns, machine, self.stations.odd)
         self._agenda = Agenda(self.stations, self.interlocks, self._writes, self.checks,
                               self.readings.reads, self.guests, self.tasks)
@@ -188,7 +186,7 @@ class Driver:
     def take_over(self, before: Driver) -> None:
         """Take what the driver of the old files knows: new files change nothing on the line."""
         self.served.take_over(before.served)
-        self._record.take_over(before._record)
+        self._flights.take_over(before._flights)
         for station in before.stations:
             if station.number in self.stations:
                 self.stations[station.number].has_gateway |= station.has_gateway
@@ -284,21 +282,21 @@ class Driver:
         self._writes.expire(now)
         self.tasks.expire(now)
         self.guests.expire(now)
-        self._read_backs.expire(now)
+        self._flights.expire(now)
         if now >= self._demands.next_expiry:
             self._demands.expire(now)
 
     def next_expiry(self) -> float:
         """Return when ``expire`` has work (clock value in s), infinite for never."""
-        return min(self._writes.next_expiry, self.tasks.next_expiry, self.guests.next_expiry,
-                   self.interlocks.ours.due, self._read_backs.next_expiry,
-                   self._demands.next_expiry)
+        due = min(self._writes.next_expiry, self.tasks.next_expiry, self.guests.next_expiry,
+                  self.interlocks.ours.due, self._demands.next_expiry)
+        return min(due, self._flights.next_expiry) if self._flights.unread else due
 
     def _gateway_replied(self, number: int) -> None:
-        self._record.gateway_replied(number)
+        self._flights.gateway_replied(number)
 
     def _station_changed(self, station: Station) -> None:
-        self._standing.forget(station.number)
+        self._flights.forget(station.number)
         if station.active:
             self.readings.reads.release(station.number, self.machine.now)
             self.interlocks.contact(station.number, self.machine.now)
@@ -343,13 +341,13 @@ class Driver:
                     self._end_write(write, Outcome.NOT_SENT, _NOT_HEARD)
             else:
                 self.served.store(write.mapping, write.raw)
-                self._record.ended(self._record.begin(
+                self._flights.ended(self._flights.begin(
                     OUR_TABLE, (write.mapping.extent,), write), Outcome.WRITTEN)
                 self._end_write(write, Outcome.WRITTEN)
 
     def _leave_out(self, write: Write, now: float) -> str:
         """Return the proof that a message need not be written, empty for no proof."""
-        proof = self._standing.proof(write, now)
+        proof = self._flights.proof(write, now)
         if not proof or not self.interlocks.may_stand(write):
             return ''
         self.interlocks.stands(write)
@@ -403,7 +401,6 @@ class Driver:
         if not isinstance(error, PortLost):
             error = PortLost(INTERNAL_ERROR)
         self.is_online = False
-        self._standing.forget()
         self.tasks.fail(error)
         self._agenda.port_lost(self.machine.now)
         self.guests.end()
@@ -412,7 +409,7 @@ class Driver:
         for write in self._inbox.close():
             self._end_write(write, Outcome.NOT_SENT, str(error))
         self._writes.drop(str(error), self.machine.now)
-        self._read_backs.end(self.machine.now)
+        self._flights.port_lost()
 
     def _foreign_value(self, mapping: Mapping, text: str, is_conflict: bool) -> None:
         """Report the value; ask for the mode at once: a PLC with a download is not in RUN."""
@@ -424,6 +421,6 @@ class Driver:
         if identity is not None and identity.is_running is not None:
             is_running = identity.is_running and not identity.faults
             if not is_running:  # a download may follow
-                self._standing.forget(station)
+                self._flights.forget(station)
             self.interlocks.mode_seen(station, is_running, self.machine.now)
         self.readings.told(station, identity, asked)

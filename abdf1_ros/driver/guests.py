@@ -35,13 +35,20 @@ import math
 from abdf1_ros.df1.packet import BROADCAST, is_local_status, Packet
 from abdf1_ros.df1.probes import Asker
 from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.driver.flights import Flight, Flights
 from abdf1_ros.driver.guest_rules import GuestRules, ShareAccess
 from abdf1_ros.driver.inbox import Inbox
 from abdf1_ros.driver.job_tasks import Job, LineTime
-from abdf1_ros.driver.record import Claim, WriteRecord
 from abdf1_ros.driver.unanswered import UnansweredCommands
-from abdf1_ros.driver.write import Outcome
-from abdf1_ros.errors import CommandExpired, PortLost, StationInactive
+from abdf1_ros.driver.write import outcome_of
+from abdf1_ros.errors import (
+    CommandExpired,
+    CommandTimeout,
+    LinkError,
+    PortLost,
+    RemoteError,
+    StationInactive,
+)
 from abdf1_ros.pccc.describe import effect_of
 from abdf1_ros.pccc.dialect import Steps
 from abdf1_ros.pccc.notation import Effect
@@ -60,7 +67,7 @@ class GuestListener:
     def sends(self, guest: Guest, command: Packet) -> None:
         """Take a command that is sent now, with our SRC and TNS."""
 
-    def wrote(self, guest: Guest, command: Packet, claim: Claim) -> None:
+    def wrote(self, guest: Guest, command: Packet, flight: Flight) -> None:
         """Take a command that may have changed words of a PLC, and which words."""
 
     def goes_beyond(self, guest: Guest, command: Packet) -> None:
@@ -123,11 +130,11 @@ class GuestJob(Job):
     blames = False
 
     def __init__(self, queue: GuestQueue, asked: GuestCommand, station: int,
-                 claim: Claim | None) -> None:
+                 flight: Flight | None) -> None:
         self.asked = asked
         self.station = station
         self.expires = queue.expiry(asked)
-        self.claim = claim
+        self.flight = flight
         self.sts = 0  # of the reply
         self.has_failed = False  # no reply came
         self._queue = queue
@@ -150,18 +157,18 @@ class GuestQueue:
     The commands of all guests, in turns.
 
     ``put`` may be called from any thread. A command that has waited ``patience`` s is not sent any
-    more. ``rules`` say what is allowed. Each command that may change words is in the ``record``.
+    more. ``rules`` say what is allowed. Each command that may change words is in ``flights``.
     ``fell_silent`` is called when a station that only guests ask has become silent.
     """
 
     def __init__(self, stations: ActiveStationList, line: LineTime, patience: float,
-                 rules: GuestRules, record: WriteRecord,
+                 rules: GuestRules, flights: Flights,
                  fell_silent: Callable[[], None] = lambda: None) -> None:
         self._stations = stations
         self.line = line
         self._patience = patience
         self._rules = rules
-        self._record = record
+        self._flights = flights
         self._fell_silent = fell_silent
         self._unanswered = UnansweredCommands()
         self.inbox: Inbox[GuestCommand] = Inbox(is_open=False)  # commands not sorted yet
@@ -223,7 +230,7 @@ class GuestQueue:
             is_read = effect_of(command.packet) is Effect.READS
             is_vain = station == BROADCAST if is_read else not may_write
             if not is_vain and self._stations.claim_message(station, now):
-                job = GuestJob(self, command, station, self._claim(command.packet, station))
+                job = GuestJob(self, command, station, self._begin(command.packet, station))
                 job.is_probe = not self._stations[station].replies_in_time
                 return job
             self._give_up(command, _OFF_LINE)
@@ -237,15 +244,15 @@ class GuestQueue:
         """
         for guest in self.waiting:
             station = self._rules.station_of(guest.waiting[0].packet.dst)
-            if station not in busy and not (station == BROADCAST and self._record.is_rewriting):
+            if station not in busy and not (station == BROADCAST and self._flights.is_rewriting):
                 return guest
         return None
 
-    def _claim(self, packet: Packet, station: int) -> Claim | None:
+    def _begin(self, packet: Packet, station: int) -> Flight | None:
         """Record a command that may change words."""
         if not effect_of(packet).may_change_words:
             return None
-        return self._record.begin(station, self._rules.words_of(packet, station))
+        return self._flights.begin(station, self._rules.words_of(packet, station))
 
     def expiry(self, command: GuestCommand) -> float:
         """Return the clock value (s) from which a command is too old."""
@@ -280,11 +287,11 @@ class GuestQueue:
             if was_sent or not isinstance(error, CommandExpired):  # else it was not even asked
                 self._silent(station, self.line.now)
             self._give_up(command, _status_of(error, was_sent))
-        if (claim := job.claim) is not None:
-            outcome = outcome_of(station, job.sts, error, was_sent)
-            self._record.ended(claim, outcome, may_land=outcome is Outcome.UNKNOWN)
+        if (flight := job.flight) is not None:
+            fault = _fault_of(job.sts, error)
+            self._flights.ended(flight, outcome_of(station, fault), fault)
             if was_sent:
-                command.guest.listener.wrote(command.guest, command.packet, claim)
+                command.guest.listener.wrote(command.guest, command.packet, flight)
         self._stations.tried(
             station, begun, self.line.now, asker=Asker.MESSAGE, was_silent=True)
 
@@ -336,14 +343,11 @@ def _refuse(command: GuestCommand, sts: int) -> None:
     command.answer(command.packet.reply(sts=sts))
 
 
-def outcome_of(station: int, sts: int, error: Exception | None, was_sent: bool) -> Outcome:
-    if not was_sent:
-        return Outcome.NOT_SENT
-    if error is not None or is_local_status(sts):
-        return Outcome.UNKNOWN
-    if sts:
-        return Outcome.FAILED
-    return Outcome.BROADCAST if station == BROADCAST else Outcome.WRITTEN
+def _fault_of(sts: int, error: Exception | None) -> LinkError | RemoteError | None:
+    """Return why a command is not confirmed; after a bug it may have been executed."""
+    if error is not None:
+        return error if isinstance(error, LinkError) else CommandTimeout()
+    return RemoteError(sts, None, '') if sts else None
 
 
 def _status_of(error: Exception, was_sent: bool) -> int:

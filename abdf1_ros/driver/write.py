@@ -21,7 +21,7 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import NamedTuple
 
-from abdf1_ros.df1.packet import is_local_status
+from abdf1_ros.df1.packet import BROADCAST, is_local_status
 from abdf1_ros.errors import FormatError, LinkError, RemoteError
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.dialect import Dialect
@@ -48,6 +48,15 @@ class Outcome(Enum):
     PARTLY = 'only partly written'
     UNKNOWN = 'unknown whether written'
     FALLBACK = 'fallback value written'
+
+
+def outcome_of(station: int, error: RemoteError | LinkError | None) -> Outcome:
+    """Return how a command that writes has ended: the one judge of whether it has landed."""
+    if error is None:
+        return Outcome.BROADCAST if station == BROADCAST else Outcome.WRITTEN
+    if isinstance(error, RemoteError):
+        return Outcome.UNKNOWN if is_local_status(error.sts) else Outcome.FAILED
+    return Outcome.UNKNOWN if error.sent else Outcome.NOT_SENT
 
 
 class Origin(NamedTuple):
@@ -79,9 +88,7 @@ class WriteResult:
     @property
     def is_unconfirmed(self) -> bool:
         """Tell whether the PLC may have executed a packet that it has not confirmed."""
-        if isinstance(self.error, RemoteError):
-            return is_local_status(self.error.sts)
-        return self.error is not None and self.error.sent
+        return outcome_of(self.mapping.station, self.error) is Outcome.UNKNOWN
 
     def of(self, origins: Iterable[Origin], now: float) -> Iterator[WriteResult]:
         """Return the same result for each of these messages, as it is ``now`` (clock, s)."""

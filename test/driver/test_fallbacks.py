@@ -17,18 +17,18 @@
 from collections import Counter
 import math
 from random import Random
-from unittest.mock import Mock
 
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave
 from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.driver.flights import Flight, Flights
 from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackRow, FallbackState
 from abdf1_ros.driver.interlocks.heartbeat import HeartbeatRow
 from abdf1_ros.driver.interlocks.plc import Conditions, Plc
-from abdf1_ros.driver.record import Claim, WriteListener, WriteRecord
 from abdf1_ros.driver.write import Outcome, Write
 from abdf1_ros.driver.writes.queue import WriteQueue
+from abdf1_ros.errors import CommandTimeout
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.emulated import EmulatedProcessor, Setting
 from abdf1_ros.pccc.identity import Mode
@@ -63,13 +63,13 @@ class OneRow(StillClock):
     def __init__(self, cmd_timeout: float = 0.5) -> None:
         super().__init__()
         self.mapping = speed_row()
-        self.record = WriteRecord(self, 2 * cmd_timeout, ActiveStationList())
-        self.row = FallbackRow(self.record.words_of(self.mapping))
+        self.flights = Flights(self, 2 * cmd_timeout, ActiveStationList())
+        self.row = FallbackRow(self.flights.words_of(self.mapping))
 
     def message(self, begun: float, done: float, outcome: Outcome) -> None:
         """Let a message end that was published when it began."""
-        claim = self._write(Write(self.mapping, [3], begun), done, outcome)
-        self.row.write_ended(claim, done)
+        flight = self._write(Write(self.mapping, [3], begun), done, outcome)
+        self.row.write_ended(flight, done)
 
     def fallback(self, write: Write, done: float, outcome: Outcome = Outcome.WRITTEN
                  ) -> float | None:
@@ -78,16 +78,17 @@ class OneRow(StillClock):
 
     def guest(self, now: float) -> None:
         self.now = now
-        claim = self.record.begin(1, [self.mapping.extent])
-        self.record.ended(claim, Outcome.WRITTEN)
-        self.row.write_ended(claim, now)
+        flight = self.flights.begin(1, [self.mapping.extent])
+        self.flights.ended(flight, Outcome.WRITTEN)
+        self.row.write_ended(flight, now)
 
-    def _write(self, write: Write, done: float, outcome: Outcome) -> Claim:
+    def _write(self, write: Write, done: float, outcome: Outcome) -> Flight:
         self.now = write.requested
-        claim = self.record.begin(1, [self.mapping.extent], write)
+        flight = self.flights.begin(1, [self.mapping.extent], write)
         self.now = done
-        self.record.ended(claim, outcome, may_land=outcome in (Outcome.UNKNOWN, Outcome.PARTLY))
-        return claim
+        lost = CommandTimeout() if outcome is Outcome.PARTLY else None
+        self.flights.ended(flight, outcome, lost)
+        return flight
 
 
 @pytest.mark.parametrize(('begun', 'again'), [(1.5, 2.0), (2.0, math.inf)])
@@ -108,27 +109,24 @@ def test_rule_10_write_may_land_after_reloads_of_files_that_had_no_fallback_for_
         is_guests: bool, now: float, until: float) -> None:
     row, clock = speed_row(None), StillClock()
     before, between, after = (
-        WriteRecord(clock, 1.0, ActiveStationList()) for _ in range(3))
-    claim = before.begin(1, [row.extent], None if is_guests else Write(row, [3], 0.0))
+        Flights(clock, 1.0, ActiveStationList()) for _ in range(3))
+    flight = before.begin(1, [row.extent], None if is_guests else Write(row, [3], 0.0))
     clock.now = 1.0
-    before.ended(claim, Outcome.UNKNOWN, may_land=True)
+    before.ended(flight, Outcome.UNKNOWN)
     before.ended(before.begin(1, [row.extent]), Outcome.WRITTEN)
-    words, told, clock.now = after.words_of(speed_row()), WriteListener(), now
-    told.may_land = Mock()  # type: ignore[method-assign]
-    after.connect((told,), ())
+    words, clock.now = after.words_of(speed_row()), now
     between.take_over(before)
     after.take_over(between)
     assert words.lands_until == until
-    assert told.may_land.call_count == (until > now)
 
 
 def test_rule_19_each_value_of_ours_that_may_land_is_ours_after_reloads() -> None:
     clock = StillClock()
-    before, after = (WriteRecord(clock, 1.0, ActiveStationList()) for _ in range(2))
+    before, after = (Flights(clock, 1.0, ActiveStationList()) for _ in range(2))
     row = beat_row()
     for value in (3, 0):
         write = Write(row, [value], 0.0, is_own=True)
-        before.ended(before.begin(1, [row.extent], write), Outcome.UNKNOWN, may_land=True)
+        before.ended(before.begin(1, [row.extent], write), Outcome.UNKNOWN)
     words, others = (after.words_of(made) for made in (beat_row(), beat_row(address='N10:1')))
     after.take_over(before)
     assert [words.may_hold(value) for value in (3, 0, 4)] == [True, True, False]
@@ -168,11 +166,11 @@ def test_rule_10_write_that_ends_with_the_port_may_land_for_its_time_from_then_o
 @pytest.mark.parametrize(('processor', 'again'), [('ML1000', 1.0), ('5/03', math.inf)])
 def test_rule_10_word_that_may_be_written_back_late_has_old_values_of_other_bits(
         processor: str, again: float) -> None:
-    record = WriteRecord(StillClock(), 1.0, ActiveStationList())
+    flights = Flights(StillClock(), 1.0, ActiveStationList())
     row, other = (make_mapping(f'B3:0/{bit}', 'Write', plc='SLC', processor=processor)
                   for bit in range(2))
-    words, claim = record.words_of(row), record.begin(1, [other.extent], Write(other, [1], 0.0))
-    record.ended(claim, Outcome.UNKNOWN, may_land=True)
+    words, flight = flights.words_of(row), flights.begin(1, [other.extent], Write(other, [1], 0.0))
+    flights.ended(flight, Outcome.UNKNOWN)
     words.plan_again(0.5)
     assert words.again_at == again
 
@@ -197,12 +195,12 @@ def test_rule_11_only_the_first_try_over_a_guest_is_not_held_up_by_a_pause() -> 
 
 def test_rule_11_answered_write_of_a_guest_ends_the_pause() -> None:
     one = OneRow()
-    plc = Plc(1, [one.row], ActiveStationList([1], probe_time=1.0), one.record, Conditions())
+    plc = Plc(1, [one.row], ActiveStationList([1], probe_time=1.0), one.flights, Conditions())
 
     def ended(now: float, outcome: Outcome, write: Write | None = None) -> None:
-        claim = Claim(1, [one.mapping.extent], write, now - 0.5)
-        claim.end(outcome, now, 0.0)
-        plc.write_ended(claim, now)
+        flight = Flight(1, [one.mapping.extent], write, now - 0.5)
+        flight.end(outcome, now, 0.0)
+        plc.write_ended(flight, now)
 
     one.row.make_due(FallbackCause.START, 0.0)
     own = one.row.take(0.0)
@@ -228,7 +226,7 @@ def test_rule_11_answered_write_of_a_guest_ends_the_pause() -> None:
 
 def test_rule_5_waiting_row_of_a_silent_plc_hides_no_earlier_time() -> None:
     one, stations = OneRow(), ActiveStationList([1], probe_time=1.0)
-    plc = Plc(1, [one.row], stations, one.record, Conditions(ended=0.0))
+    plc = Plc(1, [one.row], stations, one.flights, Conditions(ended=0.0))
     stations.lost(1, 0.0)
     plc.due = 1.0
     assert plc.next_due(2.0) == 2.0
@@ -239,14 +237,14 @@ def test_rule_5_waiting_row_of_a_silent_plc_hides_no_earlier_time() -> None:
 def test_rule_11_first_tries_go_first_then_plcs_that_answer() -> None:
     one = OneRow()
     stations = ActiveStationList([1], probe_time=1.0)
-    plc = Plc(1, [one.row], stations, one.record, conditions := Conditions())
+    plc = Plc(1, [one.row], stations, one.flights, conditions := Conditions())
     one.row.make_due(FallbackCause.START, 0.0)
     stations.heard(1, 0.0)
     first = plc.rank(one.row, 0.0)
     own = one.row.take(0.0)
     one.fallback(own, 0.1, Outcome.FAILED)
     answers = plc.rank(one.row, 2.0)
-    silent = Claim(1, [one.mapping.extent], own, 2.0)
+    silent = Flight(1, [one.mapping.extent], own, 2.0)
     silent.end(Outcome.UNKNOWN, 2.1, 0.0)
     plc.write_ended(silent, 2.1)
     left_alone = plc.rank(one.row, 4.0)
@@ -495,12 +493,12 @@ def test_rule_8_fallback_that_stands_is_put_off(
         event: str, waits: bool, after: float, put_off: float) -> None:
     one, stations = OneRow(), ActiveStationList([1], probe_time=1.0)
     row, row.after = one.row, after
-    plc = Plc(1, [row], stations, one.record, Conditions())
+    plc = Plc(1, [row], stations, one.flights, Conditions())
     row.make_due(FallbackCause.START, 0.0)
     one.fallback(row.take(0.0), 1.0)
     row.has_failed = 'failure' in event
     if event == 'write of its words':
-        one.record.begin(1, [one.mapping.extent])
+        one.flights.begin(1, [one.mapping.extent])
     elif event == 'silence':
         stations.lost(1, 2.0)
     stations[1].overdue = 2 * (event == 'late replies')
@@ -573,14 +571,14 @@ def test_rule_9_write_of_another_row_to_the_same_words_holds_up_for_its_own_time
 
 
 def test_rule_9_fallbacks_that_became_due_during_a_write_follow_it_together() -> None:
-    record = (one := OneRow()).record
-    rows = [one.row, FallbackRow(record.words_of(speed_row(address='N7:1')))]
-    plc = Plc(1, rows, ActiveStationList([1], probe_time=1.0), record, Conditions())
-    claim = record.begin(1, [make_mapping('N7:0', length=2).extent])
+    flights = (one := OneRow()).flights
+    rows = [one.row, FallbackRow(flights.words_of(speed_row(address='N7:1')))]
+    plc = Plc(1, rows, ActiveStationList([1], probe_time=1.0), flights, Conditions())
+    flight = flights.begin(1, [make_mapping('N7:0', length=2).extent])
     for now, row in enumerate(rows):
         row.make_due(FallbackCause.TIMEOUT, now)
         assert plc.ready({}, now) == []
-    record.ended(claim, Outcome.WRITTEN)
+    flights.ended(flight, Outcome.WRITTEN)
     plc.release()
     assert plc.ready({}, 2.0) == rows
 
@@ -679,11 +677,11 @@ def test_rule_10_once_more_after_a_message_that_may_have_been_written(
     (True, 0.1, True), (False, 0.1, False), (True, 0.0, False)])  # 0.0: ours began just after it
 def test_rule_8_0_that_a_guest_may_have_written_over_meanwhile_is_written_once_more(
         is_known: bool, done: float, is_again: bool) -> None:
-    words = OneRow().record.words_of(beat_row())
+    words = OneRow().flights.words_of(beat_row())
     beat = HeartbeatRow(words, 1, Random(0))
     beat.begin(0.0, is_new=True)
-    ours = Claim(1, [words.row.extent], beat.take(0.0), 0.0)
-    guest = Claim(1, ours.extents if is_known else None)
+    ours = Flight(1, [words.row.extent], beat.take(0.0), 0.0)
+    guest = Flight(1, ours.extents if is_known else None)
     guest.end(Outcome.UNKNOWN, done, 1.0)
     words.ended(guest)
     ours.end(Outcome.WRITTEN, 0.2, 0.0)
@@ -694,7 +692,7 @@ def test_rule_8_0_that_a_guest_may_have_written_over_meanwhile_is_written_once_m
 
 
 def test_rule_10_heartbeat_counts_after_a_0_that_is_written_once_more() -> None:
-    beat = HeartbeatRow(OneRow().record.words_of(beat_row()), 1, Random(0))
+    beat = HeartbeatRow(OneRow().flights.words_of(beat_row()), 1, Random(0))
     beat.begin(0.0, is_new=True)
     for now, outcome in ((0.0, Outcome.WRITTEN), (0.3, Outcome.UNKNOWN), (0.5, Outcome.WRITTEN)):
         assert beat.judge(now, '', now, {})
@@ -714,11 +712,13 @@ def test_rule_10_heartbeat_counts_after_a_0_that_is_written_once_more() -> None:
 
 
 def test_rule_10_0_is_written_once_more_also_where_the_heartbeat_may_count_by_then() -> None:
-    beat = HeartbeatRow(OneRow().record.words_of(beat_row(5000)), 1, Random(0))
+    one = OneRow(cmd_timeout=1.0)
+    beat = HeartbeatRow(one.flights.words_of(beat_row(5000)), 1, Random(0))
     for begun, why in (0.0, ''), (5.2, ''), (6.0, 'no message'):  # 0, a number, and 0 again
         assert beat.judge(begun, why, begun, {})
         beat.take(begun)
-        beat.words.may_land(('a number',), begun + 2.0)
+        one.now = begun
+        one.flights.ended(one.flights.begin(1, None), Outcome.UNKNOWN)  # may land for 2 s
         beat.ended(Outcome.WRITTEN, begun + 0.1)
     assert [beat.judge(now, '', now, {}) for now in (6.5, 7.9, 8.0)] == [False, False, True]
 

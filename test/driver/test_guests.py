@@ -20,14 +20,14 @@ from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 from abdf1_ros.df1.packet import BROADCAST, Packet
+from abdf1_ros.driver.flights import Flight
 from abdf1_ros.driver.foreign_words import written_extents
 from abdf1_ros.driver.guest_rules import ShareAccess
-from abdf1_ros.driver.guests import Guest, GuestCommand, GuestListener, outcome_of
+from abdf1_ros.driver.guests import Guest, GuestCommand, GuestListener
 from abdf1_ros.driver.interlocks.heartbeat import BeatState
-from abdf1_ros.driver.record import Claim
 from abdf1_ros.driver.settings import DriverSettings
-from abdf1_ros.driver.write import Outcome
-from abdf1_ros.errors import CommandExpired, CommandTimeout, PortLost
+from abdf1_ros.driver.write import Outcome, outcome_of
+from abdf1_ros.errors import CommandExpired, CommandTimeout, LinkError, PortLost, RemoteError
 from abdf1_ros.messages import Message
 from abdf1_ros.pccc.extent import Extent
 from abdf1_ros.plan.bounds import OURS_BESIDE_GUESTS
@@ -48,8 +48,8 @@ class Told(GuestListener):
     def __init__(self) -> None:
         self.words: list[tuple[int, Sequence[Extent] | None]] = []
 
-    def wrote(self, guest: Guest, command: Packet, claim: Claim) -> None:
-        self.words.append((claim.station, claim.extents))
+    def wrote(self, guest: Guest, command: Packet, flight: Flight) -> None:
+        self.words.append((flight.station, flight.extents))
 
 
 def bench_of(mode: str = 'Master', rows: int = 3, period: int = 50) -> DriverBench:
@@ -91,8 +91,8 @@ def test_only_a_peer_with_rows_of_one_plc_takes_any_dst(
     guest = Guest('hmi', ShareAccess.ALL)
     guests.put(GuestCommand(guest, Packet(2, 9, 0x0F, 0, 1, WRITE_N7), 0.0, print))
     job = guests.next(0.0, ())
-    assert job is not None and job.claim and job.station == meant
-    assert bool(job.claim.extents) is (meant in stations)  # the words of rows of this PLC
+    assert job is not None and job.flight and job.station == meant
+    assert bool(job.flight.extents) is (meant in stations)  # the words of rows of this PLC
 
 
 def test_guest_waits_on_an_idle_line_no_longer_than_its_last_failure_asks_for() -> None:
@@ -383,15 +383,14 @@ def beating_bench(mode: str, polling: str = 'Message') -> DriverBench:
     return bench
 
 
-@for_all('entry', [
-    (1, 0, None, Outcome.WRITTEN), (BROADCAST, 0, None, Outcome.BROADCAST),
-    (1, 0x10, None, Outcome.FAILED), (1, 0x02, None, Outcome.UNKNOWN),
-    (1, 0, CommandTimeout('no reply'), Outcome.UNKNOWN)])
-def test_what_has_come_of_a_write_of_a_guest(
-        entry: tuple[int, int, Exception | None, Outcome]) -> None:
-    station, sts, error, outcome = entry
-    assert outcome_of(station, sts, error, was_sent=True) is outcome
-    assert outcome_of(station, sts, error, was_sent=False) is Outcome.NOT_SENT
+@for_all(('station', 'error', 'outcome'), [
+    (1, None, Outcome.WRITTEN), (BROADCAST, None, Outcome.BROADCAST),
+    (1, RemoteError(0x10, None, ''), Outcome.FAILED),
+    (1, RemoteError(0x02, None, ''), Outcome.UNKNOWN),
+    (1, CommandTimeout(), Outcome.UNKNOWN), (1, CommandTimeout(sent=False), Outcome.NOT_SENT)])
+def test_what_has_come_of_a_command_that_writes(
+        station: int, error: LinkError | RemoteError | None, outcome: Outcome) -> None:
+    assert outcome_of(station, error) is outcome
 
 
 MARK = b'GUEST'  # what is easily known in a command and in its reply

@@ -21,10 +21,10 @@ from itertools import count
 import math
 
 from abdf1_ros.df1.packet import Packet
+from abdf1_ros.driver.flights import Flight
 from abdf1_ros.driver.guest_rules import ShareAccess
 from abdf1_ros.driver.guests import Guest, GuestCommand
 from abdf1_ros.driver.interlocks.fallback import FallbackState
-from abdf1_ros.driver.record import Claim
 from abdf1_ros.driver.write import Outcome
 from abdf1_ros.settings.heartbeats import Fallback
 from abdf1_ros.settings.network import POLLING_MODES
@@ -188,15 +188,15 @@ def test_rule_2_plc_behind_a_gateway_that_answers_at_all_is_a_first_contact(
     beat, = plc.heartbeats
     assert not beat.wants_zero
     plc.failures = 1
-    ours = Claim(1, [beat.mapping.extent], beat.take(cell.now), cell.now - 0.5)
+    ours = Flight(1, [beat.mapping.extent], beat.take(cell.now), cell.now - 0.5)
     ours.end(Outcome.UNKNOWN, cell.now, 1.0)
     plc.write_ended(ours, cell.now)
     assert plc.pause_end == pytest.approx(cell.now + 7 * 0.5)
     beat.ended(Outcome.UNKNOWN, cell.now)
     assert plc.ready({}, cell.now + 0.3) == [beat]  # for its gateway answers
-    claim = Claim(1, [beat.mapping.extent])
-    claim.end(outcome, cell.now, -math.inf)
-    plc.write_ended(claim, cell.now)
+    flight = Flight(1, [beat.mapping.extent])
+    flight.end(outcome, cell.now, -math.inf)
+    plc.write_ended(flight, cell.now)
     assert (plc.failures, beat.wants_zero) == (0, True)
 
 

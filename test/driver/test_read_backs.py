@@ -18,10 +18,10 @@ from collections.abc import Callable
 import math
 
 from abdf1_ros.df1.frames import STX
-from abdf1_ros.driver.record import Claim
+from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.driver.flights import Flights
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome, Write, WriteResult
-from abdf1_ros.driver.writes.read_backs import ReadBacks
 from abdf1_ros.errors import CommandTimeout, RemoteError
 from abdf1_ros.plan.forecast import line_model
 from abdf1_ros.plan.planner import Block, Planner
@@ -50,17 +50,20 @@ class Unconfirmed:
         self.block = block_of(read)
         self.results: list[WriteResult] = []
         self.line = StillClock(EARLY)
-        self.backs = ReadBacks(self.line, PATIENCE, self.results.append)
+        self.flights = Flights(
+            self.line, 1.0, ActiveStationList(), PATIENCE, self.results.append)
         self.add(mapping, values)
 
     def add(self, mapping: Mapping, values: list[float] | str) -> None:
         write = Write(mapping, values, EARLY)
         lost = write.result(Outcome.UNKNOWN, 'lost', CommandTimeout())
-        self.backs.add(write, lost, [self.block])
+        flight = self.flights.begin(mapping.station, [mapping.extent], write)
+        self.flights.tell(flight, lost, [self.block])
+        self.flights.ended(flight, lost.outcome, lost.error)
 
     def read(self, data: bytes, started: float = EARLY) -> None:
         self.line.now = EARLY + 1
-        self.backs.words_read(self.block, data, started)
+        self.flights.words_read(self.block, data, started)
 
     @property
     def details(self) -> list[str]:
@@ -114,31 +117,31 @@ def test_nothing_reads_all_of_the_words(text: str, length: int, station: int) ->
     mapping = make_mapping(text, 'Write', length=length, station=station)
     unconfirmed = Unconfirmed(make_mapping('N7:0', length=2), mapping, [1] * length)
     assert unconfirmed.details == ['lost; not read back: no row reads all of these words']
-    assert unconfirmed.backs.next_expiry == math.inf
+    assert unconfirmed.flights.next_expiry == math.inf
 
 
 def test_read_that_began_before_the_write_ended_says_nothing() -> None:
     mapping = make_mapping('N7:0', 'ReadWrite')
     unconfirmed = Unconfirmed(mapping, mapping, [5])
     unconfirmed.read(b'\5\0', EARLY - 0.001)
-    unconfirmed.backs.words_read(block_of(make_mapping('N9:0')), b'\5\0', EARLY)  # of others
+    unconfirmed.flights.words_read(block_of(make_mapping('N9:0')), b'\5\0', EARLY)  # of others
     other = Unconfirmed(mapping, mapping, [5])
-    other.backs.end(EARLY)  # the port of another line is lost
+    other.flights.port_lost()  # the port of another line is lost
     assert (len(other.details), unconfirmed.details) == (1, [])
 
 
 def test_read_back_that_does_not_come_ends_when_patience_does() -> None:
-    mapping = make_mapping('N7:0', 'ReadWrite')
-    unconfirmed = Unconfirmed(mapping, mapping, [5])
+    mapping = make_mapping('N7:0', 'Write')
+    unconfirmed = Unconfirmed(make_mapping('N7:0', length=2), mapping, [5])
     unconfirmed.line.now = EARLY + 1.5
-    unconfirmed.add(make_mapping('N7:0', 'Write', tag='later'), [6])
+    unconfirmed.add(make_mapping('N7:1', 'Write', tag='later'), [6])
     for number, end in enumerate((EARLY, EARLY + 1.5)):
-        assert unconfirmed.backs.next_expiry == end + PATIENCE
-        unconfirmed.backs.expire(end + PATIENCE - 0.001)
+        assert unconfirmed.flights.next_expiry == end + PATIENCE
+        unconfirmed.flights.expire(end + PATIENCE - 0.001)
         assert len(unconfirmed.details) == number
-        unconfirmed.backs.expire(end + PATIENCE)
+        unconfirmed.flights.expire(end + PATIENCE)
     assert unconfirmed.details == 2 * ['lost; not read back within 2 s']
-    assert unconfirmed.backs.next_expiry == math.inf
+    assert unconfirmed.flights.next_expiry == math.inf
 
 
 @pytest.mark.parametrize(('text', 'is_overtaken'), [('N7:0', True), ('N7:1', False)])
@@ -146,7 +149,7 @@ def test_newer_write_ends_the_wait_for_the_same_words(text: str, is_overtaken: b
     mapping = make_mapping('N7:0', 'ReadWrite')
     for newer in (Write(make_mapping(text, 'Write'), [6], EARLY), None):  # a guest's
         unconfirmed = Unconfirmed(mapping, mapping, [5])
-        unconfirmed.backs.write_begins(Claim(1, [make_mapping(text).extent], newer))
+        unconfirmed.flights.begin(1, [make_mapping(text).extent], newer)
         assert unconfirmed.details == ([OVERTAKEN] if is_overtaken else [])
 
 

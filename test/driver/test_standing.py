@@ -15,17 +15,15 @@
 """Write_Again: a message is not written again while reads show that its value stands."""
 
 from collections.abc import Sequence
-from functools import partial
 from itertools import pairwise
-import math
 
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave
-from abdf1_ros.driver.record import Claim
+from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.driver.flights import Flight, Flights
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome, Write
-from abdf1_ros.driver.writes.standing import Standing
 from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.pccc.families import dialect_of
 from abdf1_ros.pccc.file_types import PlcType
@@ -34,6 +32,7 @@ from abdf1_ros.settings.heartbeats import Fallback
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 import pytest
+from support.clock import StillClock
 from support.driver_bench import DriverBench, store, stored
 from support.interlocks import Cell
 from support.mappings import make_mapping
@@ -41,6 +40,15 @@ from support.mappings import make_mapping
 WORD = make_mapping('N7:0', 'Write', write_again=1000)
 READ = make_mapping('N7:0', length=4, period=100)
 WRITTEN, STANDS = Outcome.WRITTEN, Outcome.STANDS
+
+
+def flights_of(*rows: Mapping) -> tuple[Flights, StillClock, ActiveStationList]:
+    """Return the flights of rows of station 1, and their clock; a read holds for 0.5 s."""
+    clock, stations = StillClock(1.0), ActiveStationList([1])
+    flights = Flights(clock, 1.0, stations, 0.5)
+    for row in rows:
+        flights.words_of(row)
+    return flights, clock, stations
 
 
 class Line(DriverBench):
@@ -178,13 +186,14 @@ def test_neighbour_bits_do_not_disturb_each_other() -> None:
 def test_word_that_may_be_written_back_late_disturbs_its_other_bits() -> None:
     rows = [make_mapping(f'B3:0/{bit}', 'Write', plc='SLC', processor='5/01', write_again=1000)
             for bit in range(2)]
-    standing, line = Standing(rows, 0.5), DriverBench([make_mapping('B3:0', plc='SLC')])
+    flights, clock, _ = flights_of(*rows)
+    line = DriverBench([make_mapping('B3:0', plc='SLC')])
     for row, outcome in zip(rows, (WRITTEN, Outcome.UNKNOWN), strict=True):
-        claim = Claim(1, [row.extent], Write(row, [1], 1.0), 1.0)
-        claim.end(outcome, 1.1, 0.0 if outcome is WRITTEN else 1.0)
-        standing.write_ended(claim)
-        standing.words_read(*line.driver.readings.blocks, b'\1\0', 1.2)
-        assert bool(standing.proof(Write(rows[0], [1], 1.3), 1.3)) is (outcome is WRITTEN)
+        flight = flights.begin(1, [row.extent], Write(row, [1], 1.0))
+        clock.now = 1.1
+        flights.ended(flight, outcome)
+        flights.words_read(*line.driver.readings.blocks, b'\1\0', 1.2)
+        assert bool(flights.proof(Write(rows[0], [1], 1.3), 1.3)) is (outcome is WRITTEN)
 
 
 def test_unconfirmed_write_and_what_follows_prove_nothing() -> None:
@@ -201,59 +210,63 @@ def test_unconfirmed_write_and_what_follows_prove_nothing() -> None:
 
 def test_unconfirmed_write_may_land_over_the_confirmed_one_that_follows() -> None:
     block, = Line(WORD, READ).driver.readings.blocks
-    standing = Standing([WORD], 0.5)
+    flights, clock, stations = flights_of(WORD)
 
-    def end(value: int, begun: float, outcome: Outcome, may_land_for: float) -> Write:
-        write = Write(WORD, [value], begun)
-        claim = Claim(1, [WORD.extent], write, begun)
-        standing.write_begins(claim)
-        claim.end(outcome, begun + 0.1, may_land_for)
-        standing.write_ended(claim)
-        standing.words_read(block, bytes((value, *7 * [0])), begun + 0.1)
+    def end(value: int, begun: float, outcome: Outcome = WRITTEN) -> Write:
+        """Let a message end 0.1 s after it began; without an answer it may land for 1 s more."""
+        write, clock.now = Write(WORD, [value], begun), begun
+        flight = flights.begin(1, [WORD.extent], write)
+        clock.now = begun + 0.1
+        flights.ended(flight, outcome)
+        flights.words_read(block, bytes((value, *7 * [0])), clock.now)
         return write
 
-    end(8, 1.0, Outcome.UNKNOWN, 1.0)
-    assert not standing.proof(end(9, 2.05, WRITTEN, 0.0), 2.2)
-    late = end(9, 2.1, WRITTEN, 0.0)  # confirmed at 2.2
-    standing.words_read(block, bytes(8), 2.1)
-    assert standing.proof(late, 2.69) and not standing.proof(late, 2.7)
-    standing.words_read(block, bytes((9, *7 * [0])), 2.75)
-    assert standing.proof(late, 3.1995) and not standing.proof(late, 3.2)
-    guest = Claim(1, [WORD.extent], begun=2.8)
-    standing.write_begins(guest)
-    assert not standing.proof(late, 2.8)
-    meanwhile = end(9, 2.8, WRITTEN, 0.0)
-    guest.end(WRITTEN, 2.9, 0.0)
-    standing.write_ended(guest)
-    assert not standing.proof(meanwhile, 2.9)
-    end(8, 3.0, Outcome.UNKNOWN, 5.0)
-    end(7, 3.2, Outcome.UNKNOWN, 0.5)  # the write before it may land after it
-    assert not standing.proof(end(9, 4.0, WRITTEN, 0.0), 4.2)
-    end(8, 8.15, WRITTEN, 0.0)
-    last = end(9, 8.3, WRITTEN, 0.0)
+    end(8, 1.0, Outcome.UNKNOWN)
+    assert not flights.proof(end(9, 2.05), 2.2)
+    late = end(9, 2.1)  # confirmed at 2.2
+    flights.words_read(block, bytes(8), 2.1)
+    assert flights.proof(late, 2.69) and not flights.proof(late, 2.7)
+    flights.words_read(block, bytes((9, *7 * [0])), 2.75)
+    assert flights.proof(late, 3.1995) and not flights.proof(late, 3.2)
+    clock.now = 2.8
+    guest = flights.begin(1, [WORD.extent])
+    assert not flights.proof(late, 2.8)
+    meanwhile = end(9, 2.8)
+    flights.ended(guest, WRITTEN)
+    assert not flights.proof(meanwhile, 2.9)
+    end(8, 3.0, Outcome.UNKNOWN)
+    end(7, 3.2, Outcome.UNKNOWN)
+    assert not flights.proof(end(9, 4.0), 4.2)
+    end(8, 4.4)
+    last = end(9, 4.6)
     for station, is_kept in ((2, True), (1, False)):
-        standing.forget(station)
-        assert bool(standing.proof(last, 8.4)) is is_kept
-    before = Claim(1, [WORD.extent])  # the driver before ~/reload
-    before.end(Outcome.UNKNOWN, 9.0, 1.0)
-    for settled, may_land in ((10.0, partial(standing.may_land, before)),
-                              (11.0, partial(standing.earlier_may_land, {1}, 11.0))):
-        may_land()
-        assert not standing.proof(last, settled - 1.0)
-        last = end(9, settled - 0.1, WRITTEN, 0.0)
-        assert not standing.proof(last, settled)
-        last = end(9, settled, WRITTEN, 0.0)
-        assert standing.proof(last, settled + 0.2)
+        flights.forget(station)
+        assert bool(flights.proof(last, 4.7)) is is_kept
+    before = Flights(clock, 1.0, ActiveStationList())  # of the driver before ~/reload
+    clock.now = 9.0
+    before.ended(before.begin(1, [WORD.extent]), Outcome.UNKNOWN)
+    flights.take_over(before)
+    assert not flights.proof(last, 9.0)
+    assert not flights.proof(end(9, 9.9), 10.0)
+    last = end(9, 10.0)
+    assert flights.proof(last, 10.2)
+    flights.opened()  # at 10.1: nobody knows of a gateway yet
+    assert flights.proof(last, 10.2)
+    stations[1].has_gateway = True
+    assert not flights.proof(last, 10.2)
+    assert not flights.proof(end(9, 11.0), 11.2)
+    assert flights.proof(end(9, 11.1), 11.3)
 
 
 def test_write_that_has_ended_may_have_changed_words_unless_it_cannot_land() -> None:
-    claim = Claim(1, [WORD.extent, make_mapping('N9:0').extent])
-    assert claim.meets(WORD.extent) and not Claim(2, None).meets(WORD.extent)
-    found = [claim.has_changed]
-    for may_land_for in (-math.inf, 0.0, 9.0):
-        claim.end(Outcome.UNKNOWN, 1.0, may_land_for)
-        found.append(claim.has_changed)
+    flight = Flight(1, [WORD.extent, make_mapping('N9:0').extent])
+    assert flight.meets(WORD.extent) and not Flight(2, None).meets(WORD.extent)
+    found = [flight.has_changed]
+    for outcome in (Outcome.FAILED, WRITTEN, Outcome.UNKNOWN):
+        flight.end(outcome, 1.0, 9.0)
+        found.append(flight.has_changed)
     assert found == [False, False, True, True]
+    assert flight.lands_until == 10.0
 
 
 def test_write_between_two_packets_of_a_read_stands_all_the_same() -> None:

@@ -32,12 +32,12 @@ from abdf1_ros.df1.slave_link import SlaveLink
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.checks import StationHealth
 from abdf1_ros.driver.driver import Driver
+from abdf1_ros.driver.flights import Flight
 from abdf1_ros.driver.guests import Guest
 from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackState
 from abdf1_ros.driver.interlocks.heartbeat import BeatState
 from abdf1_ros.driver.overheard import Carried
 from abdf1_ros.driver.reads.point import ReadPoint
-from abdf1_ros.driver.record import Claim
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome, Write, WriteResult
 from abdf1_ros.messages import Event, Message
@@ -959,7 +959,7 @@ def test_value_of_a_guest_over_a_fallback_is_a_warning(make_bench: Benches) -> N
     row, = bench.driver.interlocks.fallbacks
     row.state = FallbackState.STANDS
     assert bench.says('interlocks')[0] == OK
-    guest = Claim(1, [row.mapping.extent])
+    guest = Flight(1, [row.mapping.extent])
     guest.done = guest.lands_until = NOW
     row.write_ended(guest, NOW)
     row.cause = FallbackCause.TIMEOUT

@@ -22,9 +22,9 @@ from unittest.mock import Mock
 from abdf1_ros.cli.sniff import main as sniff
 from abdf1_ros.client import Client
 from abdf1_ros.df1.packet import Packet
+from abdf1_ros.driver.flights import Flight
 from abdf1_ros.driver.guest_rules import ShareAccess
 from abdf1_ros.driver.guests import Guest, GuestCommand
-from abdf1_ros.driver.record import Claim
 from abdf1_ros.errors import RemoteError
 from abdf1_ros.ros.bridge.guests import GuestPlaces
 from abdf1_ros.settings.mapping import Mapping
@@ -120,11 +120,11 @@ def test_write_that_may_be_to_words_of_the_bridge_is_told_with_its_rows() -> Non
     file_write = Packet(1, 0, 15, 0, 7, bytes.fromhex('03 00 00 01 00 06 07 09 11 22'))
     text = 'guest pty:a has sent to station 1: file write 00 00 01 00 06 07 09 11 22'
     for words in ([row.extent for row in rows[1::-1]], [rows[1].extent], None):
-        places.wrote(guest, file_write, Claim(1, words))
+        places.wrote(guest, file_write, Flight(1, words))
     assert (guest.collisions, told_by(notes)) == (2, [
         f'{text}, words of alive, a, b',
         f'{text}, with unknown words, which may be those of alive, a, b'])
-    places.wrote(guest, file_write, Claim(255, None))
+    places.wrote(guest, file_write, Flight(255, None))
     assert told_by(notes)[-1].endswith('which may be those of alive, a, b, far')
 
 

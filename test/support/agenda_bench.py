@@ -25,6 +25,7 @@ from abdf1_ros.df1.machine import LineTiming
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.agenda import Agenda
 from abdf1_ros.driver.checks import Checks
+from abdf1_ros.driver.flights import Flight, Flights
 from abdf1_ros.driver.guest_rules import GuestRules
 from abdf1_ros.driver.guests import GuestQueue
 from abdf1_ros.driver.interlocks.queue import Interlocks
@@ -32,7 +33,6 @@ from abdf1_ros.driver.job_tasks import JobTasks
 from abdf1_ros.driver.reads.job import ReadJob
 from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.driver.reads.readings import Readings
-from abdf1_ros.driver.record import Claim, WriteRecord
 from abdf1_ros.driver.served import Served
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome, Write, WriteResult
@@ -59,12 +59,12 @@ def make_job(text: str = 'N7:0', station: int = 1, period: int = 100) -> ReadJob
                    lambda job, words, error: None, math.inf)
 
 
-def written(write: Write, now: float, outcome: Outcome = Outcome.WRITTEN) -> Claim:
+def written(write: Write, now: float, outcome: Outcome = Outcome.WRITTEN) -> Flight:
     """Return a write that has ended, by default a confirmed one."""
-    record = WriteRecord(StillClock(now), 1.0, ActiveStationList())
-    claim = record.begin(write.mapping.station, [write.mapping.extent], write)
-    record.ended(claim, outcome)
-    return claim
+    flights = Flights(StillClock(now), 1.0, ActiveStationList())
+    flight = flights.begin(write.mapping.station, [write.mapping.extent], write)
+    flights.ended(flight, outcome)
+    return flight
 
 
 class Bench:
@@ -76,11 +76,10 @@ class Bench:
         self.stations = ActiveStationList([job.station for job in jobs], probe_time=PROBE_TIME)
         self.tasks = JobTasks(5, 0, line := StillClock())
         listener = Recorder(lambda: 0.0)
-        self.record = WriteRecord(line, 1.0, self.stations)
+        self.flights = Flights(line, 1.0, self.stations, write_timeout, self.results.append)
         readings = Readings(Network(), Rows(), DriverSettings(), self.stations, line, listener,
-                            self.record)
-        writing = WritesUnderWay(self.stations, self.record, readings, write_timeout,
-                                 self.results.append)
+                            self.flights)
+        writing = WritesUnderWay(self.stations, self.flights, readings)
         self.reads = readings.reads
         self.writes = WriteQueue(self.stations, writing, write_timeout, self.results.append,
                                  lambda write, now: '', tx_delay=0.25)
@@ -91,7 +90,7 @@ class Bench:
         interlocks = Interlocks(Rows(), self.writes, writing, served, listener,
                                 lambda mapping, text, is_conflict: None)
         rules = GuestRules(Network(), Rows(), lambda station: None)
-        guests = GuestQueue(self.stations, line, 1.0, rules, self.record)
+        guests = GuestQueue(self.stations, line, 1.0, rules, self.flights)
         self.agenda = Agenda(
             self.stations, interlocks, self.writes, checks, self.reads, guests, self.tasks)
         self.reads.replace((), jobs, 0.0)
@@ -106,7 +105,7 @@ class Bench:
 
     def end(self, job: WriteJob) -> None:
         """Let a write end unsent."""
-        self.record.ended(job.claim, Outcome.NOT_SENT)
+        self.flights.ended(job.flight, Outcome.NOT_SENT)
 
     def begin_write(self, now: float, busy: Container[int] = ()) -> Write | None:
         """Take the next write, which is under way from then on."""

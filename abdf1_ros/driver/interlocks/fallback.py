@@ -24,7 +24,7 @@ from dataclasses import dataclass
 from enum import Enum
 import math
 
-from abdf1_ros.driver.record import Claim, OwnWords
+from abdf1_ros.driver.flights import Flight, Words
 from abdf1_ros.driver.write import Outcome, Write
 from abdf1_ros.settings.heartbeats import LEAST_REFRESH
 from abdf1_ros.settings.limits import raw_values
@@ -84,7 +84,7 @@ class FallbackRow:
     - ``refused_until``: ``Crowd.until`` of the last crowd for which the fallback became due.
     """
 
-    def __init__(self, words: OwnWords) -> None:
+    def __init__(self, words: Words) -> None:
         mapping = words.row
         assert mapping.fallback is not None
         self.mapping = mapping
@@ -225,16 +225,16 @@ class FallbackRow:
         self.state = FallbackState.OVERWRITTEN if self.words.are_guests else FallbackState.STANDS
         return now - self._due_since if was_due else None
 
-    def write_ended(self, claim: Claim, now: float) -> None:
+    def write_ended(self, flight: Flight, now: float) -> None:
         """Record how a message of this row, or a write of a guest to these words, ended."""
-        if claim.write is not None:
-            assert claim.outcome is not None
-            self.message_ended(claim.write.requested, claim.outcome)
-            if claim.outcome is Outcome.WRITTEN:
+        if flight.write is not None:
+            assert flight.outcome is not None
+            self.message_ended(flight.write.requested, flight.outcome)
+            if flight.outcome is Outcome.WRITTEN:
                 # an unconfirmed message may have set a later time
                 self._due_since = min(self._due_since, now)
-        elif claim.has_changed and self.stands:
-            if claim.extents is None:  # its words are unknown, hardly these
+        elif flight.has_changed and self.stands:
+            if flight.extents is None:  # its words are unknown, hardly these
                 self.refresh_at = now
             else:
                 self.state = FallbackState.OVERWRITTEN

@@ -25,7 +25,7 @@ from enum import Enum
 import math
 from random import Random
 
-from abdf1_ros.driver.record import Claim, OwnWords
+from abdf1_ros.driver.flights import Flight, Words
 from abdf1_ros.driver.write import Outcome, Write
 
 LARGEST = 32_767
@@ -114,7 +114,7 @@ class HeartbeatRow:
     - ``dice``: random numbers, so that two bridges differ.
     """
 
-    def __init__(self, words: OwnWords, first: int, dice: Random) -> None:
+    def __init__(self, words: Words, first: int, dice: Random) -> None:
         mapping = words.row
         assert mapping.period is not None
         self.mapping = mapping
@@ -190,9 +190,9 @@ class HeartbeatRow:
             self._write_zero(now)
         return is_due
 
-    def write_ended(self, claim: Claim, now: float) -> None:
+    def write_ended(self, flight: Flight, now: float) -> None:
         """Record the end of a write to this word: a guest may have overwritten our 0."""
-        if claim.write is None and claim.has_changed and claim.extents is not None:
+        if flight.write is None and flight.has_changed and flight.extents is not None:
             self.overwritten(now)
 
     def overwritten(self, now: float) -> None:

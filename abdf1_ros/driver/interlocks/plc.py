@@ -28,9 +28,9 @@ from operator import attrgetter
 
 from abdf1_ros.df1.probes import OTHERS_SHARE
 from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.driver.flights import Flight, Flights
 from abdf1_ros.driver.interlocks.fallback import Crowd, FallbackCause, FallbackRow
 from abdf1_ros.driver.interlocks.heartbeat import HeartbeatRow
-from abdf1_ros.driver.record import Claim, WriteRecord
 from abdf1_ros.driver.write import key_of, Outcome
 from abdf1_ros.settings.heartbeats import LEAST_REFRESH
 from abdf1_ros.settings.mapping import Mapping
@@ -100,7 +100,7 @@ class Plc:
     """
 
     def __init__(self, station: int, rows: Iterable[OwnRow], stations: ActiveStationList,
-                 record: WriteRecord, conditions: Conditions) -> None:
+                 flights: Flights, conditions: Conditions) -> None:
         self.station = station
         self.rows = [*rows]
         self.heartbeats = [row for row in self.rows if isinstance(row, HeartbeatRow)]
@@ -111,7 +111,7 @@ class Plc:
         self._is_running: bool | None = None
         self._held_up: list[FallbackRow] = []
         self._stations = stations
-        self._record = record
+        self._flights = flights
         self._conditions = conditions
 
     @property
@@ -174,7 +174,7 @@ class Plc:
         self.look_again(*self._held_up)
         self._held_up.clear()
 
-    def write_ended(self, claim: Claim, now: float) -> None:
+    def write_ended(self, flight: Flight, now: float) -> None:
         """
         Record how a write to this PLC ended, also of a guest, and whether the PLC has answered.
 
@@ -183,16 +183,16 @@ class Plc:
         because its station was active all the time (rules 2, 8).
         """
         is_behind_gateway = self._stations[self.station].has_gateway
-        if claim.outcome in _ANSWERED:
+        if flight.outcome in _ANSWERED:
             was_lost, self.failures, self.pause_end = self.is_lost, 0, -math.inf
             if was_lost and is_behind_gateway:
                 self.contact(now)
-        elif claim.outcome is Outcome.UNKNOWN and claim.write is not None and claim.write.is_own:
-            if self._stations.odd.is_odd(key_of(claim.write.mapping, is_own=True)):
+        elif flight.outcome is Outcome.UNKNOWN and (write := flight.write) and write.is_own:
+            if self._stations.odd.is_odd(key_of(write.mapping, is_own=True)):
                 return  # only this row waits then
             self.failures += 1
             if self.is_lost:
-                took = self._record.line.took(claim.begun, now)
+                took = self._flights.line.took(flight.begun, now)
                 share = OTHERS_SHARE * took if is_behind_gateway else 0.0
                 self.pause_end = now + max(_LEAST_PAUSE, share)
 
@@ -202,7 +202,7 @@ class Plc:
         """Return the rows with a due write; ``youngest`` has the youngest message of each row."""
         due = [row for row in self.fallbacks
                if row.due <= now and row.judge(now, youngest.get(row.mapping, -math.inf))]
-        held_up = [row for row in due if not self._record.may_begin(row.mapping)]
+        held_up = [row for row in due if not self._flights.may_begin(row.mapping)]
         for row in held_up:  # a write of its words is under way (rule 9); its end is reported
             row.due = math.inf
         self._held_up += held_up
@@ -277,7 +277,7 @@ class Plc:
             if row.refresh_at > now:
                 break
             is_put_off = row.mapping in youngest and not row.has_failed
-            if not is_put_off and self._record.may_begin(row.mapping) \
+            if not is_put_off and self._flights.may_begin(row.mapping) \
                     and self._stations[self.station].replies_in_time:
                 return row
             row.refresh_at = now + min(row.after, LEAST_REFRESH)

@@ -28,6 +28,7 @@ import math
 from operator import attrgetter
 from random import Random
 
+from abdf1_ros.driver.flights import Flight, WriteListener
 from abdf1_ros.driver.interlocks.fallback import (
     Crowd,
     FallbackCause,
@@ -38,7 +39,6 @@ from abdf1_ros.driver.interlocks.heartbeat import BeatState, HeartbeatRow, LARGE
 from abdf1_ros.driver.interlocks.plc import Conditions, OwnRow, Plc, TurnRank
 from abdf1_ros.driver.job_tasks import Job
 from abdf1_ros.driver.reads.readings import ValueListener
-from abdf1_ros.driver.record import Claim, WriteListener
 from abdf1_ros.driver.served import Served
 from abdf1_ros.driver.write import Outcome, Write, WriteResult
 from abdf1_ros.driver.writes.queue import WriteQueue
@@ -73,16 +73,16 @@ class Interlocks(WriteListener):
     def __init__(self, mappings: Rows, writes: WriteQueue, writing: WritesUnderWay,
                  served: Served, listener: ValueListener,
                  warn: Callable[[Mapping, str, bool], None], seed: int = 0) -> None:
-        record, dice = writing.record, Random(seed)
-        self.heartbeats = [HeartbeatRow(record.words_of(mapping), 1 + seed % LARGEST, dice)
+        flights, dice = writing.flights, Random(seed)
+        self.heartbeats = [HeartbeatRow(flights.words_of(mapping), 1 + seed % LARGEST, dice)
                            for mapping in mappings.heartbeats]
-        self.fallbacks = [FallbackRow(record.words_of(mapping))
+        self.fallbacks = [FallbackRow(flights.words_of(mapping))
                           for mapping in mappings.fallbacks]
         self.conditions = Conditions()
         rows: list[OwnRow] = [*self.heartbeats, *self.fallbacks]
         stations_of = {row: row.mapping.extent.station for row in rows}
         self.plcs = {number: Plc(
-            number, [row for row in rows if stations_of[row] == number], writing.stations, record,
+            number, [row for row in rows if stations_of[row] == number], writing.stations, flights,
             self.conditions)
             for number in dict.fromkeys((OUR_TABLE, *stations_of.values()))}
         self._plc_of = {row: self.plcs[number] for row, number in stations_of.items()}
@@ -165,7 +165,7 @@ class Interlocks(WriteListener):
         """
         if self.is_over:
             return False
-        return is_open or self._writing.record.has_sent and any(
+        return is_open or self._writing.flights.has_sent and any(
             is_meant(row.mapping) for row in self._unconfirmed_rows())
 
     @property
@@ -181,7 +181,7 @@ class Interlocks(WriteListener):
 
     def _unconfirmed_rows(self) -> Iterator[OwnRow]:
         """Return the rows of PLCs where a command may stand, also while the port is lost."""
-        may_begin = self._writing.record.may_begin
+        may_begin = self._writing.flights.may_begin
         return (row for plc in self.plcs.values() for row in plc.rows
                 if not row.is_confirmed or not may_begin(row.mapping))
 
@@ -206,7 +206,7 @@ class Interlocks(WriteListener):
         An end that has lost the port begins anew.
         """
         self.conditions.ended, self._standing = math.inf, ()
-        self._writing.record.opened()
+        self._writing.flights.opened()
         if not self._has_begun:
             for row in self.fallbacks:
                 row.make_due(FallbackCause.START, now)
@@ -215,7 +215,7 @@ class Interlocks(WriteListener):
             plc.contact(now, is_new=True)
         self.ours.plan()
 
-    def earlier_may_land(self, stations: Container[int], until: float) -> None:
+    def earlier_may_land(self, stations: Container[int]) -> None:
         """Write again what such a write may have replaced, also where it has just shown (10)."""
         for row, plc in self._plc_of.items():
             if plc.station in stations and row.is_confirmed:
@@ -304,19 +304,19 @@ class Interlocks(WriteListener):
             row.message_ended(write.requested, Outcome.WRITTEN)
             self._plc_of[row].look_again(row)
 
-    def write_ended(self, claim: Claim) -> None:
+    def write_ended(self, flight: Flight) -> None:
         """Record how any write ended: fallbacks may wait for its end (rules 7, 9)."""
-        now = self._writing.record.line.now
-        if claim.station in self.plcs:
-            self.plcs[claim.station].write_ended(claim, now)
+        now = self._writing.flights.line.now
+        if flight.station in self.plcs:
+            self.plcs[flight.station].write_ended(flight, now)
         rows: list[OwnRow] = []
-        if claim.write is None:
+        if flight.write is None:
             rows += (row for plc in self.plcs.values() for row in plc.rows
-                     if claim.meets(row.mapping.extent))
-        elif claim.write.mapping in self._by_mapping and not claim.write.is_own:
-            rows.append(self._by_mapping[claim.write.mapping])
+                     if flight.meets(row.mapping.extent))
+        elif flight.write.mapping in self._by_mapping and not flight.write.is_own:
+            rows.append(self._by_mapping[flight.write.mapping])
         for row in rows:
-            row.write_ended(claim, now)
+            row.write_ended(flight, now)
             if not row.is_confirmed:
                 self._leave_standing(row)
             if isinstance(row, FallbackRow):
@@ -327,8 +327,8 @@ class Interlocks(WriteListener):
             self._plc_of[row].look_again(row)
         for plc in self.plcs.values():
             plc.release()
-        if (write := claim.write) is not None and write.is_own:
-            self._own_ended(claim, write, now)
+        if (write := flight.write) is not None and write.is_own:
+            self._own_ended(flight, write, now)
 
     def write_expired(self, write: Write) -> None:
         """Let the fallback stop waiting for a message that has ended before it had the line."""
@@ -449,10 +449,10 @@ class Interlocks(WriteListener):
         return row.words.again_at <= self._writing.line.now \
             or row.mapping in self._writes.youngest()
 
-    def _own_ended(self, claim: Claim, write: Write, now: float) -> None:
+    def _own_ended(self, flight: Flight, write: Write, now: float) -> None:
         """Record how one of our own writes ended."""
-        assert claim.outcome is not None
-        row, outcome = self._row_of[write.mapping], claim.outcome
+        assert flight.outcome is not None
+        row, outcome = self._row_of[write.mapping], flight.outcome
         plc = self._plc_of[row]
         if isinstance(row, HeartbeatRow):
             row.ended(outcome, now)
@@ -467,8 +467,8 @@ class Interlocks(WriteListener):
             self._leave_standing(row)
         plc.plan()  # the row is due, so its heartbeats are judged again, too (rule 3 b)
         if outcome is not Outcome.NOT_SENT:
-            refusal = '' if outcome is Outcome.WRITTEN else str(claim.error)
-            if isinstance(claim.error, RemoteError) and refusal != row.refusal:
+            refusal = '' if outcome is Outcome.WRITTEN else str(flight.error)
+            if isinstance(flight.error, RemoteError) and refusal != row.refusal:
                 self._listener.unreadable(row.mapping, f'not written: {refusal}')
             row.refusal = refusal
 

@@ -22,13 +22,13 @@ import math
 from typing import Protocol
 
 from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.driver.flights import Flights
 from abdf1_ros.driver.job_tasks import LineTime
 from abdf1_ros.driver.reads.demands import ReadAnswer, ReadCall, ReadCalls
 from abdf1_ros.driver.reads.guards import Guards
 from abdf1_ros.driver.reads.job import ReadJob, ReadTooOld
 from abdf1_ros.driver.reads.point import Guard, ReadPoint
 from abdf1_ros.driver.reads.silent import Reads
-from abdf1_ros.driver.record import WriteRecord
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import WriteResult
 from abdf1_ros.errors import (
@@ -85,14 +85,14 @@ class Readings:
     """
     The ``points`` of all rows that are published, and the ``reads`` that serve them.
 
-    ``listener`` gets the values, ``record`` all words. ``planner`` knows the packets that each
+    ``listener`` gets the values, ``flights`` all words. ``planner`` knows the packets that each
     station accepts. ``mode_periods`` has the stations that have to be asked for their mode, with
     the period (s).
     """
 
     def __init__(self, network: Network, mappings: Rows, settings: DriverSettings,
                  stations: ActiveStationList, line: LineTime, listener: ValueListener,
-                 record: WriteRecord) -> None:
+                 flights: Flights) -> None:
         self.planner = Planner(line_model(network), settings.default_period)
         blocks = self.planner.plan(mappings.repeated)
         self._longest_frames = max((max(block.line_times) for block in blocks), default=0.0)
@@ -110,7 +110,7 @@ class Readings:
         self._stations = stations
         self._line = line
         self._listener = listener
-        self._record = record
+        self._flights = flights
         self._refusals = Refusals(self.planner)
         self.reads.replace((), map(self._job, blocks), 0.0)
 
@@ -200,7 +200,7 @@ class Readings:
     def _read(self, job: ReadJob, data: bytes) -> None:
         """Update the points for which this read was made."""
         now = self._line.now
-        for reader in self._record.readers:
+        for reader in self._flights.readers:
             reader.words_read(job.block, data, job.started)
         if self.guards.counters:
             for point, place in job.points.items():

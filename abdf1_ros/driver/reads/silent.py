@@ -28,10 +28,10 @@ import math
 from operator import attrgetter
 
 from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.driver.flights import Flight, WriteListener
 from abdf1_ros.driver.reads.job import ReadJob
 from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.driver.reads.queue import ReadQueue
-from abdf1_ros.driver.record import Claim, WriteListener
 
 
 class Reads(WriteListener):
@@ -273,13 +273,14 @@ class Reads(WriteListener):
         else:
             self.queue.put(job, max(job.due + job.block.period, job.started))
 
-    def write_ended(self, claim: Claim) -> None:
+    def write_ended(self, flight: Flight) -> None:
         """Make the reads of all words that the write may have changed due at once."""
-        now = claim.done
-        if not claim.has_changed or claim.write is not None and claim.write.mapping.is_heartbeat:
+        now = flight.done
+        write = flight.write
+        if not flight.has_changed or write is not None and write.mapping.is_heartbeat:
             return
         for job in self.queue.jobs:
-            if claim.meets(job.extent):
+            if flight.meets(job.extent):
                 job.refreshed = now
                 if job.due > now:
                     self.queue.put(job, now)

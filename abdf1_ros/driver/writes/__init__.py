@@ -16,6 +16,5 @@
 Messages on their way to a PLC: the queue, the packets, and the end of each.
 
 ``queue`` has the messages that wait for the line, ``under_way`` the writes that have it,
-``packets`` the commands of one write. ``read_backs`` keeps the result of an unconfirmed write
-until a read has shown the words.
+``packets`` the commands of one write.
 """

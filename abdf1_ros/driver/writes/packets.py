@@ -16,8 +16,7 @@
 
 from __future__ import annotations
 
-from abdf1_ros.df1.packet import BROADCAST, is_local_status
-from abdf1_ros.driver.write import Outcome, Write, WriteResult
+from abdf1_ros.driver.write import Outcome, outcome_of, Write, WriteResult
 from abdf1_ros.errors import (
     CommandTimeout,
     FormatError,
@@ -46,27 +45,20 @@ def carry_out(write: Write) -> Steps[WriteResult]:
     A write of our own continues after a packet that was refused or not answered: the PLC may
     execute the remaining packets.
     """
-    done, detail, failed = 0, '', None
+    done, detail, failed, station = 0, '', None, write.mapping.station
     for packet in range(len(write.commands)):
         try:
             detail = (yield from _send(write, packet)) or detail
             done += 1
         except (RemoteError, LinkError) as error:
-            if failed is None or _outcome_of(error) is Outcome.UNKNOWN:  # it may still land
-                failed = error
+            if failed is None or outcome_of(station, error) is Outcome.UNKNOWN:
+                failed = error  # it may still land
             if not write.is_own or not isinstance(error, _TAKEN_OR_NOT):
                 break
+    outcome = outcome_of(station, failed)
     if failed is not None:
-        return _ended_early(write, _outcome_of(failed), done, failed)
-    is_broadcast = write.mapping.station == BROADCAST
-    outcome = Outcome.BROADCAST if is_broadcast else Outcome.WRITTEN
+        return _ended_early(write, outcome, done, failed)
     return write.result(outcome, detail)
-
-
-def _outcome_of(error: RemoteError | LinkError) -> Outcome:
-    if isinstance(error, RemoteError):
-        return Outcome.UNKNOWN if is_local_status(error.sts) else Outcome.FAILED
-    return Outcome.UNKNOWN if error.sent else Outcome.NOT_SENT
 
 
 def _send(write: Write, packet: int) -> Steps[str]:

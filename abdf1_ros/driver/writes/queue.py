@@ -156,7 +156,7 @@ class WriteQueue:
             is_held_up = bool(held_up) if station == BROADCAST \
                 else station in held_up or BROADCAST in held_up
             if station not in busy and not is_held_up \
-                    and self._writing.record.may_begin(write.mapping):
+                    and self._writing.flights.may_begin(write.mapping):
                 return write
             held_up.add(station)
         return None
@@ -164,7 +164,7 @@ class WriteQueue:
     def youngest(self) -> dict[Mapping, float]:
         """Return, by row, when the youngest message that waits or is under way was published."""
         found: dict[Mapping, float] = {}
-        for write in itertools.chain(self.waiting, self._writing.record.messages()):
+        for write in itertools.chain(self.waiting, self._writing.flights.messages()):
             if write.mapping.fallback is not None:
                 known = found.get(write.mapping, -math.inf)
                 found[write.mapping] = max(write.requested, known)
@@ -202,7 +202,7 @@ class WriteQueue:
     def _refuse(self, write: Write, reason: str, now: float) -> None:
         """End a write that must not be sent any more: a fallback may have waited for it."""
         self._end(write, Outcome.NOT_SENT, reason, now)
-        self._writing.record.expired(write)
+        self._writing.flights.expired(write)
 
     def _end(self, write: Write, outcome: Outcome, detail: str, now: float) -> None:
         """End a write that waits, without sending it."""

@@ -16,18 +16,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 import math
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.probes import Asker
 from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.driver.flights import Flight, Flights
 from abdf1_ros.driver.job_tasks import Job
 from abdf1_ros.driver.reads.readings import Readings
-from abdf1_ros.driver.record import Claim, WriteRecord
 from abdf1_ros.driver.write import key_of, Outcome, Write, WriteResult
 from abdf1_ros.driver.writes.packets import carry_out
-from abdf1_ros.driver.writes.read_backs import ReadBacks
 from abdf1_ros.errors import CommandExpired, INTERNAL_ERROR, PortLost, RemoteError
 from abdf1_ros.pccc.dialect import Steps
 from abdf1_ros.settings.mapping import Mapping
@@ -55,7 +53,7 @@ class WriteJob(Job):
         self.is_free = is_free
         self.answer_within = answer_within
         self._writing = writing
-        self.claim = writing.begin(write)
+        self.flight = writing.begin(write)
 
     def steps(self, now: float) -> Steps[None]:
         """Send every packet."""
@@ -76,23 +74,20 @@ def is_message_of(row: Mapping, job: Job) -> bool:
 
 
 class WritesUnderWay:
-    """Carry out writes, and report their ends to ``record``, to stations and to reads."""
+    """Carry out writes, and report their ends to ``flights``, to stations and to reads."""
 
-    def __init__(self, stations: ActiveStationList, record: WriteRecord, readings: Readings,
-                 patience: float, report: Callable[[WriteResult], None]) -> None:
-        self.read_backs = ReadBacks(record.line, patience, report)
-        self._report = report
-        self.record = record
-        self.line = record.line
+    def __init__(self, stations: ActiveStationList, flights: Flights, readings: Readings) -> None:
+        self.flights = flights
+        self.line = flights.line
         self.stations = stations
         self._readings = readings
         self.spent: dict[Mapping, float] = {}  # line time (s) of each row's messages
 
-    def begin(self, write: Write) -> Claim:
+    def begin(self, write: Write) -> Flight:
         """Record that a write is under way, until it has ``ended``."""
         station = write.mapping.station
         write.is_probe = station != BROADCAST and not self.stations[station].replies_in_time
-        return self.record.begin(station, (write.mapping.extent,), write)
+        return self.flights.begin(station, (write.mapping.extent,), write)
 
     def carry_out(self, write: Write) -> Steps[WriteResult]:
         """Send a write in the packets that its station accepts."""
@@ -100,27 +95,18 @@ class WritesUnderWay:
         return (yield from carry_out(write))
 
     def ended(self, job: WriteJob) -> None:
-        """Report the result of each message, then record the end of the write."""
+        """Record the end of the write, with its result for each message."""
         write, result, station = job.write, job.result, job.station
         if not write.is_own:
-            self._tell(write, result)
+            self.flights.tell(job.flight, result, self._readings.blocks)
         if station != BROADCAST and not (job.is_free and write.is_probe):
-            self.stations.tried(station, job.claim.begun, self.line.now, was_silent=write.is_probe,
-                                asker=job.asker)
+            self.stations.tried(station, job.flight.begun, self.line.now,
+                                was_silent=write.is_probe, asker=job.asker)
         if isinstance(result.error, RemoteError):
             self.stations[station].remote_errors += 1
         elif result.error is not None and not isinstance(result.error, CommandExpired):
             self._readings.link_failed(station, result.error)
         if not write.is_own:
-            took = self.line.took(job.claim.begun, self.line.now)
+            took = self.line.took(job.flight.begun, self.line.now)
             self.spent[write.mapping] = self.spent.get(write.mapping, 0.0) + took
-        self.record.ended(job.claim, result.outcome, result.error,
-                          may_land=result.is_unconfirmed)
-
-    def _tell(self, write: Write, result: WriteResult) -> None:
-        """Report the result of each message; an unconfirmed result waits for a read."""
-        if result.is_unconfirmed:
-            self.read_backs.add(write, result, self._readings.blocks)
-        else:
-            for each in result.of(write.origins, self.line.now):
-                self._report(each)
+        self.flights.ended(job.flight, result.outcome, result.error)

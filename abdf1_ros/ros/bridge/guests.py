@@ -21,9 +21,9 @@ from dataclasses import replace
 
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.driver import Driver
+from abdf1_ros.driver.flights import Flight
 from abdf1_ros.driver.guest_rules import ShareAccess
 from abdf1_ros.driver.guests import Guest, GuestListener
-from abdf1_ros.driver.record import Claim
 from abdf1_ros.pccc.describe import command_name, describe
 from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.ros.diagnostics.log import LimitedLog
@@ -77,16 +77,16 @@ class GuestPlaces(GuestListener):
             f'guest {guest.name}: a second program, at {other}, was refused: a place takes '
             'one program at a time'))
 
-    def wrote(self, guest: Guest, command: Packet, claim: Claim) -> None:
+    def wrote(self, guest: Guest, command: Packet, flight: Flight) -> None:
         """Log that a guest has sent a write to words that this bridge writes too."""
-        rows = [row for row in self._driver.mappings if row.changes and claim.meets(row.extent)]
+        rows = [row for row in self._driver.mappings if row.changes and flight.meets(row.extent)]
         if rows:
             guest.collisions += 1
-            what = 'words of' if claim.extents is not None \
+            what = 'words of' if flight.extents is not None \
                 else 'with unknown words, which may be those of'
             self._notes.warning(
                 f'writes of {guest.name}', f'guest {guest.name} has sent to station '
-                f'{claim.station}: {describe(command)}, {what} '
+                f'{flight.station}: {describe(command)}, {what} '
                 f'{first([row.tag for row in rows])}')
 
     def goes_beyond(self, guest: Guest, command: Packet) -> None:

@@ -51,6 +51,7 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.probes import Probes
 from abdf1_ros.driver.agenda import Agenda
 from abdf1_ros.driver.driver import Driver
+from abdf1_ros.driver.flights import Flight, Words
 from abdf1_ros.driver.guests import GuestJob
 from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackRow
 from abdf1_ros.driver.interlocks.heartbeat import BeatState, HeartbeatRow
@@ -59,12 +60,10 @@ from abdf1_ros.driver.interlocks.queue import Interlocks
 from abdf1_ros.driver.reads import job
 from abdf1_ros.driver.reads.guards import CounterGuard, RunGuard
 from abdf1_ros.driver.reads.point import ReadPoint
-from abdf1_ros.driver.record import Claim, OwnWords
 from abdf1_ros.driver.served import MappedTable
 from abdf1_ros.driver.write import Outcome, Write, WriteResult
 from abdf1_ros.driver.writes.ages import HostClock, RecentMax
 from abdf1_ros.driver.writes.queue import WriteQueue
-from abdf1_ros.driver.writes.standing import Standing
 from abdf1_ros.driver.writes.under_way import WriteJob
 from abdf1_ros.pccc.values import Codec
 from abdf1_ros.plan.bounds import Times
@@ -194,7 +193,7 @@ def _requires_nothing(init: Any) -> Any:
 
 
 def _sees_no_guest(ended: Any) -> Any:
-    return lambda self, claim, now: ended(self, claim, now) if claim.write else None
+    return lambda self, flight, now: ended(self, flight, now) if flight.write else None
 
 
 def _meets_one_station(meets: Any) -> Any:
@@ -202,10 +201,10 @@ def _meets_one_station(meets: Any) -> Any:
 
 
 def _beats_are_told(ended: Any) -> Any:
-    def end_wrongly(self: Interlocks, claim: Claim, write: Write, now: float) -> None:
-        ended(self, claim, write, now)
+    def end_wrongly(self: Interlocks, flight: Flight, write: Write, now: float) -> None:
+        ended(self, flight, write, now)
         if write.mapping.is_heartbeat:
-            self._listener.written(write.result(claim.outcome or Outcome.UNKNOWN, '', now))
+            self._listener.written(write.result(flight.outcome or Outcome.UNKNOWN, '', now))
 
     return end_wrongly
 
@@ -311,21 +310,19 @@ def _undoes_one_word(take_back: Any) -> Any:
     return take_back_wrongly
 
 
-def _proves_itself(write_ended: Any) -> Any:
-    def end_wrongly(self: Standing, claim: Claim) -> None:
-        write_ended(self, claim)
-        value = claim.write and self._values.get(claim.write.mapping)
-        if value:
-            value.shown = value.confirmed
+def _proves_itself(ended: Any) -> Any:
+    def end_wrongly(self: Words, flight: Flight) -> None:
+        ended(self, flight)
+        if flight.outcome is Outcome.WRITTEN:
+            flight.shown = flight.done
 
     return end_wrongly
 
 
 def _proves_for_long(proof: Any) -> Any:
-    def prove_wrongly(self: Standing, write: Write, now: float) -> str:
-        value = self._values.get(write.mapping)
-        found: str = proof(self, write, min(now, value.shown, value.confirmed) if value else now)
-        return found
+    def prove_wrongly(self: Words, write: Write, now: float, patience: float) -> str:
+        last = self.last
+        return proof(self, write, min(now, last.shown, last.done) if last else now, patience)
 
     return prove_wrongly
 
@@ -413,9 +410,9 @@ MISTAKES = (
             'new_crowds', _always(())),
     Mistake('18', 'read_only is ignored', Driver, '__init__', _writes_in_spite),
     Mistake('19', 'nobody looks for another writer', HeartbeatRow, 'read_back', _always('')),
-    Mistake('5', 'the end does not wait for what may land', OwnWords, 'lands_until',
+    Mistake('5', 'the end does not wait for what may land', Words, 'lands_until',
             lambda before: property(lambda self: -math.inf)),
-    Mistake('10', 'nothing is written again after what a gateway may hold', OwnWords, 'plan_again',
+    Mistake('10', 'nothing is written again after what a gateway may hold', Words, 'plan_again',
             _always(None)),
     Mistake('8', 'a guest over a fallback is not seen', FallbackRow, 'write_ended',
             _sees_no_guest),
@@ -426,7 +423,7 @@ MISTAKES = (
             _lives_longer),
     Mistake('guests', 'a guest is blamed for the station', GuestJob, 'blames',
             lambda before: True),
-    Mistake('guests', 'its broadcast has the words of one station', Claim, 'meets',
+    Mistake('guests', 'its broadcast has the words of one station', Flight, 'meets',
             _meets_one_station),
     Mistake('results', 'not sent is told as written', Write, 'result', _told_as_written),
     Mistake('results', 'unknown is told as not sent', Write, 'result', _told_as_not_sent),
@@ -443,8 +440,8 @@ MISTAKES = (
     Mistake('served', 'a refused command is undone in its first word', MappedTable, 'take_back',
             _undoes_one_word),
     Mistake('results', 'no read-back shows the value', Write, 'is_held', _always(False)),
-    Mistake('27', 'a confirmation alone is the proof', Standing, 'write_ended', _proves_itself),
-    Mistake('27', 'a proof never becomes too old', Standing, 'proof', _proves_for_long))
+    Mistake('27', 'a confirmation alone is the proof', Words, 'ended', _proves_itself),
+    Mistake('27', 'a proof never becomes too old', Words, 'proof', _proves_for_long))
 
 
 def find(mistake: Mistake, seed: int, limit: float) -> tuple[str, int, float, float]:

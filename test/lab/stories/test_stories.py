@@ -21,9 +21,9 @@ from pathlib import Path
 from typing import Any
 from unittest import mock
 
+from abdf1_ros.driver.flights import Flights, Words
 from abdf1_ros.driver.interlocks.fallback import FallbackRow
 from abdf1_ros.driver.interlocks.queue import Interlocks
-from abdf1_ros.driver.record import OwnWords, WriteRecord
 import pytest
 from stories.scenes import SCENES, SMALL
 from stories.walk import Ledger, shortest, story_of, tell, text_of, Walk
@@ -67,13 +67,13 @@ def _always(value: object) -> Callable[..., object]:
 
 
 @pytest.mark.parametrize(('owner', 'name', 'made', 'scene', 'story', 'check'), [
-    (OwnWords, 'lands_until', property(_always(-math.inf)), 'little sts', 'write 2: kept last',
+    (Words, 'lands_until', property(_always(-math.inf)), 'little sts', 'write 2: kept last',
      'Belief'),
-    (WriteRecord, 'take_over', _always(None), 'little gets',
+    (Flights, 'take_over', _always(None), 'little gets',
      'write 1: kept last\nduring 1: reload same', 'Belief'),
-    (WriteRecord, 'gateway_replied', _always(None), 'little free',
+    (Flights, 'gateway_replied', _always(None), 'little free',
      'at 0.5: before speed last\nwrite 3: not delivered', 'Belief'),
-    (OwnWords, 'plan_again', _always(None), 'little beat', 'write 2: kept last', 'Belief'),
+    (Words, 'plan_again', _always(None), 'little beat', 'write 2: kept last', 'Belief'),
     (Interlocks, 'unconfirmed', _always([]), 'little end', 'write 2: kept 2\nat 0.95: end 0.3',
      'Named'),
     (FallbackRow, 'write_ended', _always(None), 'little sts', '', 'Belief')])
@@ -93,7 +93,7 @@ def tell_broken(scene: str, story: str) -> str:
 def test_story_is_its_text_and_is_shortened() -> None:
     text = 'at 1.2: message\nwrite 2: kept last'
     assert text_of(story_of(text)) == text
-    with mock.patch.object(OwnWords, 'lands_until', property(_always(-math.inf))):
+    with mock.patch.object(Words, 'lands_until', property(_always(-math.inf))):
         longest = {'at 1.2': 'guest speed', 'write 2': 'kept last'}
         assert shortest(SCENES['little sts'], longest) == {'write 2': 'kept last'}
 
