@@ -55,6 +55,7 @@ _ARGUMENTS = {'Address': 'ADDRESS', 'Length': '--length', 'Type': '--type',
               'Via': '--via'}
 
 _WITH_BASE = re.compile('0(?:x[0-9a-f]+|b[01]+|o[0-7]+)', re.IGNORECASE)
+_RACK_AND_GROUP = re.compile(r'[#$]?[IOio]\d?[:;]\d{3}(?!\d)', re.ASCII)  # of a PLC-5
 _UNIT = re.compile(r'\[(?P<unit>[^][]{1,12})\]$')
 _VALUES_IN_ROW = 10
 _BITS_IN_ROW = 16
@@ -142,7 +143,8 @@ def check_for_some_family(addresses: Sequence[str], cells: MappingType[str, str]
             except (ConfigurationError, FormatError) as error:
                 errors[family.value] = error
         if len(errors) == len(FAMILIES):
-            raise errors[cells.get('PLC_Type', PlcType.SLC.value)]
+            meant = PlcType.PLC5 if _RACK_AND_GROUP.match(address) else PlcType.SLC
+            raise errors[cells.get('PLC_Type', meant.value)]
 
 
 def _in_arguments(fault: CellFault, row: Row) -> Problem:

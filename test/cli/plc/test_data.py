@@ -215,3 +215,14 @@ def test_values_are_written_in_another_radix(
     assert data.value_texts(mapping, [value], radix) == [text]
     scaled = replace(mapping, scaling=Scaling(0.5, 0))
     assert data.value_texts(scaled, [value], radix) == [f'{value:g}']
+
+
+@for_all(('address', 'said'), [
+    ('O:051/18', 'PLC-5 I/O bits are octal, 0 to 17'), ('I:017/18', 'PLC-5 I/O bits are octal'),
+    ('i:118/3', 'PLC-5 I/O words are octal, as in I:017'), ('O:51/18', 'slots of O run from 0 to'),
+    ('I:1/18', 'bits run from 0 to 15')])
+def test_address_of_rack_and_group_is_refused_in_the_words_of_a_plc5(
+        address: str, said: str) -> None:
+    with pytest.raises(ConfigurationError) as caught:
+        data.check_for_some_family([address], {'Command': 'Read', 'Station': '1'})
+    assert said in str(caught.value)
