@@ -34,7 +34,13 @@ def word(value: int) -> bytes:
 
 
 class Reader:
-    """Take fields off the front of ``data``; FormatError when they run out."""
+    """
+    Take fields off the front of ``data``; FormatError when they run out.
+
+    With ``takes_padding`` zeros may follow the last field: some devices append them.
+    """
+
+    takes_padding = True
 
     def __init__(self, data: bytes) -> None:
         self._data = data
@@ -77,7 +83,7 @@ class Reader:
         return self.take(len(self._data) - self._position)
 
     def end(self) -> None:
-        """Raise FormatError when anything but padding is left: some devices append 00."""
+        """Raise FormatError when anything but padding is left."""
         left = self.rest()
-        if any(left):
+        if any(left) or left and not self.takes_padding:
             raise FormatError(f'{len(left)} bytes too many')

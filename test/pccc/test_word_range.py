@@ -194,3 +194,15 @@ def test_command_that_a_plc5_refuses_changes_nothing(data: str, sts: int, ext_st
     memory = table(PLC5, N7_0=counting(4))
     assert ask(memory, data) == (sts, ext_sts)
     assert words_at(memory, 'N7:0', 4) == '00 00 01 00 02 00 03 00'
+
+
+@for_all(('command', 'status'), [
+    ('01 00 00 01 00 2C 08 0A 00 02', 0), ('01 00 00 01 00 2C 08 0A 00 02 00', 0x10),
+    ('02 2C 08 0A 00 01 00 00 00', 0), ('02 2C 08 0A 00 01 00 00 00 00', 0x10)])
+def test_plc3_takes_no_byte_too_many(command: str, status: int) -> None:
+    """As the adapter of a PLC-3, 1775-KA (its manual, B-5); others take zeros as padding."""
+    assert ask(table(PLC3, B10_0='01 00'), command)[0] == status
+
+
+def test_zeros_after_a_command_are_padding_for_a_plc5() -> None:
+    assert ask(table(PLC5, N7_0='01 00'), '01 00 00 01 00 06 07 00 02 00') == (0, '01 00')

@@ -44,8 +44,9 @@ class Plc3Commands:
     protected: Codes = status.EXTENDED, status.EXT_PROTECTED
 
     def __init__(self, table: DataTable, processor: EmulatedProcessor) -> None:
-        words = WordRangeService(table, ExtendedAddress.read, _place, _CODES)
-        files = WordRangeService(table, _read_file_address, _place, _CODES)
+        # A 1775-KA takes no byte too many (its manual, B-5).
+        words = WordRangeService(table, ExtendedAddress.read, _place, _CODES, takes_padding=False)
+        files = WordRangeService(table, _read_file_address, _place, _CODES, takes_padding=False)
         self.commands = words.commands() | {(word_range.CMD, word_range.FILE_READ): files.read}
         self.basic_commands = BasicService(table, _compatibility_file).everything()
 

@@ -57,13 +57,15 @@ class WordRangeService(Generic[_Place]):
     """
     Execute word range commands on ``table``.
 
-    ``read_address`` reads the address in a command, ``find`` returns its place in the table.
+    ``read_address`` reads the address in a command, ``find`` returns its place in the table. With
+    ``takes_padding`` zeros may follow a command.
     """
 
     table: DataTable
     read_address: Callable[[Reader], _Place]
     find: Callable[[_Place], Address]
     codes: RangeCodes
+    takes_padding: bool = True
 
     def commands(self) -> Commands:
         """Return the functions by CMD and FNC."""
@@ -75,6 +77,7 @@ class WordRangeService(Generic[_Place]):
 
     def read(self, reader: Reader) -> bytes:
         """Execute a word range read, or a file read, which looks the same."""
+        reader.takes_padding = self.takes_padding
         request = WordRangeRead.read(reader, self.read_address)
         if request.size > word_range.MAX_READ:
             raise Refusal(*self.codes.bad_size)
@@ -104,6 +107,7 @@ class WordRangeService(Generic[_Place]):
         return b''
 
     def _write_bits(self, reader: Reader) -> bytes:
+        reader.takes_padding = self.takes_padding
         request = WordBitWrite.read(reader, self.read_address)
         place = word_on_line(self.find(request.address))
         self.table.write_bits(place, request.set | request.reset, request.set)
