@@ -347,7 +347,7 @@ def test_arguments_of_the_line(tmp_path: Path) -> None:
             ({'own_station': -1}, 'own_station -1'),
             ({'baud': '19200'}, "baud '19200' should be a whole number"),
             ({'baud': True}, 'baud True'), ({'baud': 0}, 'baud 0'),
-            ({'baud': 14400}, 'baud 14400 should be one of 1200, '),
+            ({'baud': 14400}, 'baud 14400 should be one of 300, 600, 1200, '),
             ({'retries': 11}, 'retries 11 should be a whole number from 0 to 10'),
             ({'timeout': 60000}, ' 60000 should be seconds above 0, up to 60; 60 for 60000 ms'),
             ({'cmd_timeout': '1'}, "cmd_timeout '1' should be seconds above 0, up to 60$"),

@@ -28,6 +28,7 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 import math
 
+from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
@@ -212,7 +213,7 @@ class Report:
     def load_remarks(self) -> list[Remark]:
         """Return the remarks on periods that the line cannot keep."""
         return [] if self.network.line_mode.only_listens else [
-            *_load_remarks(self), *_period_remarks(self)]
+            *_load_remarks(self), *_period_remarks(self), *_packet_remarks(self)]
 
 
 def _unprotected(mappings: Rows) -> Iterator[str]:
@@ -464,6 +465,20 @@ def _period_remarks(report: Report) -> Iterator[Remark]:
             yield Remark(RemarkKind.PERIOD, (
                 f'{_tags(block.mappings)}: a read takes {milliseconds(time, 1)}, '
                 f'the period is {milliseconds(block.period, 1)}'), block.station)
+
+
+def _packet_remarks(report: Report) -> Iterator[Remark]:
+    """Find packets that take the line for longer than Cmd_Timeout."""
+    network = report.network
+    longest = network.cmd_timeout / 1000
+    effect = 'by radio its reply may come too late each time: raise Cmd_Timeout' \
+        if network.duplex is Duplex.RADIO else 'all else waits that long: give guests more time'
+    for block in report.blocks:
+        if (time := max(block.line_times)) > longest:
+            yield Remark(RemarkKind.PERIOD, (
+                f'{_tags(block.mappings)}: a packet takes {milliseconds(time, 1)} at '
+                f'{network.baud} baud, Cmd_Timeout is {network.cmd_timeout} ms; {effect}, '
+                'or use shorter rows or a higher baud rate'), block.station)
 
 
 def _gap_remarks(report: Report) -> Iterator[Remark]:

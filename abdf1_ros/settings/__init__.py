@@ -25,5 +25,6 @@ Every fault has file, line and column. All faults of a file are found at once. N
 a port or makes the plan of a line.
 """
 
-BAUD_RATES = (1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200)
+# The specification's list, and 300 and 600 baud: a MicroLogix 1000 has them (its manual, D-6).
+BAUD_RATES = (300, 600, 1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200)
 PARITIES = ('None', 'Even', 'Odd')

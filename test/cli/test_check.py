@@ -102,7 +102,7 @@ def test_every_error_of_both_files_at_once(check: Check, files: Paths) -> None:
     beginnings = [
         f'error: {net}:2:2 (Mode): 2553 CRT_BAD_DRIVER_MODE: ',
         f'error: {net}:2:4 (Cmd_Timeout): 2559 CRT_BAD_CMD_TIMEOUT: ',
-        f'error: {net}:2:3 (Baud): Baud = "9601" should be one of 1200, ',
+        f'error: {net}:2:3 (Baud): Baud = "9601" should be one of 300, 600, 1200, ',
         f'error: {rows}:2:3 (Address): 2503 ERR_ADDRESS_SYNTAX: Item: 1, ',
         f'error: {rows}:3:2 (Command): Item: 2, Command = "Rad" should be one of Read, ',
         f'error: {rows}:3:4 (Station): 2501 ERR_BAD_STATION: Item: 2, ',

@@ -182,6 +182,21 @@ def test_period_that_another_baud_rate_can_keep() -> None:
                          'of shorter ones')
 
 
+def test_packets_that_take_longer_than_cmd_timeout_are_named() -> None:
+    rows = [make_mapping('N7:0', length=2, tag='speed'),
+            make_mapping('N9:0', length=30, tag='recipe')]
+    for mode, baud, cmd_timeout, named in (
+            ('Master', 9600, 500, []), ('Master', 1200, 1000, []), ('Master', 300, 5000, []),
+            ('Master', 300, 2000, ['recipe']), ('Radio', 300, 1000, ['speed', 'recipe'])):
+        line = Network(mode=mode, baud=baud, cmd_timeout=cmd_timeout)
+        found = texts(make_report(line, rows, 60.0, 0.0), RemarkKind.PERIOD)
+        assert [text.partition(':')[0] for text in found] == named, (mode, baud, found)
+    assert found[1] == (
+        'recipe: a packet takes 4496.7 ms at 300 baud, Cmd_Timeout is 1000 ms; by radio its reply '
+        'may come too late each time: raise Cmd_Timeout, or use shorter rows or a higher baud '
+        'rate')
+
+
 def test_plcs_of_a_radio_network_work_on_their_answers_at_a_time() -> None:
     rows = [make_mapping('N7:0', station=1), make_mapping('N7:0', station=2),
             make_mapping('N9:0', 'Heartbeat', period=1000)]  # which is read every 500 ms

@@ -321,8 +321,8 @@ def test_gateway_is_polled_for_the_stations_behind_it(
      'lists the devices'),
     ('net.station', 5.0,
      '2552 CRT_BAD_STATION_ID: Station = "5.0" should be a whole number from 0 to 254'),
-    ('net.baud', 9601, 'Baud = "9601" should be one of 1200, 2400, 4800, 9600, 19200, 38400, '
-                       '57600, 115200'),
+    ('net.baud', 9601, 'Baud = "9601" should be one of 300, 600, 1200, 2400, 4800, 9600, 19200, '
+                       '38400, 57600, 115200'),
     ('net.handshake', 1, 'Handshake = "1" should be one of Yes, No')])
 def test_faulty_value_is_a_problem_that_says_what_would_be_right(
         make_node: Nodes, files: Files, name: str, value: Any, expected: str) -> None:

@@ -33,7 +33,7 @@ from abdf1_ros.df1.echo import COMES_BACK
 from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings.network import Network
 
-# Baud rates to try, the usual rates first.
+# Baud rates to try, the usual rates first. Very slow rates only if they are given.
 BAUD_RATES = (19200, 9600, 38400, 57600, 115200, 4800, 2400, 1200)
 CHECKS = tuple(check.value for check in (Checksum.CRC, Checksum.BCC))
 

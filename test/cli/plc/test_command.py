@@ -212,7 +212,7 @@ def test_signal_ends_it(tmp_path: Path) -> None:
 @for_all(('args', 'text'), [
     (('read', 'N7:0'), 'name the port, such as --port /dev/ttyUSB0'),
     (('read', 'N7:0', '--port', 'x', '--peer', '--duplex', 'half'), 'not allowed with'),
-    (('read', 'N7:0', '--port', 'x', '--baud', '1'), '--baud: Baud = "1" should be one of 1200'),
+    (('read', 'N7:0', '--port', 'x', '--baud', '1'), '--baud: Baud = "1" should be one of 300'),
     (('read', 'N7:0', '--port', 'x'), '--port: Com_Port = "x" should be'),
     (('read', 'N7:0', '--net', '/nowhere/net.csv'), '/nowhere/net.csv: cannot be read'),
     (('scan', '0-300', '--port', 'x'), '"0-300" should be a station from 0 to 254'),
