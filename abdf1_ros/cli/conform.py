@@ -59,6 +59,7 @@ from abdf1_ros.conform.case import (
 )
 from abdf1_ros.conform.cases import CASES
 from abdf1_ros.conform.codec import BlockCheck, HEADER_SIZE
+from abdf1_ros.conform.data import why_no_words
 from abdf1_ros.conform.ends import (
     AskingEnd,
     MasterEnd,
@@ -241,7 +242,23 @@ def _tell_results(options: argparse.Namespace, results: Sequence[CaseResult],
 
 
 def _identity(end: AskingEnd) -> Identity | None:
-    """Ask the target for its identity; without --family the cases that read use its family."""
+    """
+    Ask the target for its identity; without --family the cases that read use its family.
+
+    Tell why they are skipped if the target does not know the commands of its family.
+    """
+    identity = _ask_identity(end)
+    try:
+        why_not = why_no_words(end)
+    except (Failed, Skipped):  # the cases report the fault
+        return identity
+    if why_not:
+        tell('conform', f'{why_not}; cases that read or write words are skipped')
+        end.words = replace(end.words, why_not=why_not)
+    return identity
+
+
+def _ask_identity(end: AskingEnd) -> Identity | None:
     end.wire.begin(LONGEST_CASE)
     try:
         end.settle()

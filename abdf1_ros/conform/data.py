@@ -136,7 +136,18 @@ def identity(end: AskingEnd) -> None:
 def _words_of(end: AskingEnd) -> Words:
     if not end.words.family:
         raise Skipped('needs --family PLC5 or SLC')
+    if end.words.why_not:
+        raise Skipped(end.words.why_not)
     return end.words
+
+
+def why_no_words(end: AskingEnd) -> str:
+    """Return why the words of the target can be neither read nor written, empty if they can."""
+    words = end.words
+    if not words.family or end.ask(_TYPED, _read_body(words, 1))[3] != _ILLEGAL:
+        return ''
+    return (f'STS 10 for a typed read of {words.address}: the target does not have the typed '
+            f'commands of --family {words.family}, or not this file (--words)')
 
 
 def _number(value: int) -> bytes:

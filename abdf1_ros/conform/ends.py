@@ -97,12 +97,14 @@ class Words:
 
     ``address`` is the first word, in an integer file, such as N7:0. ``count`` words from there on
     may be overwritten (0: none). ``family`` is PLC5 or SLC, empty where it is not known.
+    ``why_not`` is why the words cannot be read although it is known, empty if they can.
     """
 
     file: int = 7
     element: int = 0
     count: int = 0
     family: str = ''
+    why_not: str = ''
 
     @property
     def address(self) -> str:

@@ -36,10 +36,12 @@ import pytest
 from support.cases import for_all
 from support.commands import Output, running_simulator
 from support.driver_bench import simulated_plc
-from support.odd_device import frame
-from support.plc_line import plc_line
+from support.odd_device import Answer, frame, OddDevice, Wiring
+from support.plc_line import odd_line, plc_line
 from support.ptys import Pty
 
+OF_WORDS = ('read-words', 'element-too-high', 'write-and-read', 'word-order', 'masked-write',
+            'bad-check-not-executed')
 QUICK = ('--only', 'poll-idle', '--only', 'message-acknowledged', '--only', 'nak-resets')
 
 
@@ -256,3 +258,19 @@ def test_cases_are_listed_and_numbers_up_to_their_bounds_are_taken(
         reader_left.setattr('abdf1_ros.cli.terminal.drop_output', Mock())
         reader_left.setattr('builtins.print', Mock(side_effect=BrokenPipeError))
         assert main(['client', '--list', *args]) == 1
+
+
+def test_device_without_the_typed_commands_of_its_family_has_one_sentence_and_no_failure(
+        tmp_path: Path, capsys: Output) -> None:
+    device = OddDevice(Wiring.FULL)
+    device.takes = lambda data: Answer.ACK if data[2] & 0x4F == 6 else Answer.REFUSES
+    with odd_line(tmp_path / 'line', device) as name:
+        status = main([
+            'peer', '--port', name, '--family', 'SLC', '--words', 'N7:0', '--yes', *(
+                word for case in ('identity', *OF_WORDS) for word in ('--only', case))])
+    said = capsys.readouterr()
+    why = ('STS 10 for a typed read of N7:0: the target does not have the typed commands of '
+           '--family SLC, or not this file (--words)')
+    assert said.err.count(why) == 1
+    assert said.out.count(f'skipped: {why}\n') == len(OF_WORDS)
+    assert (status, said.out.splitlines()[-1]) == (0, '1 passed, 0 failed, 6 skipped')

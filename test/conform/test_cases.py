@@ -87,14 +87,16 @@ def test_our_driver_passes_every_case(
         target: Target, mode: str, polling: str, check: str) -> None:
     results = results_of(asking(check, mode, polling), target, check)
     assert failures(results) == []
-    assert {result.verdict for result in results} == {Verdict.PASS}
+    left_open = [result.case.name for result in results if result.verdict is not Verdict.PASS]
+    # It ends the command as failed at once (2505).
+    assert left_open == ['other-code-not-used'] * (target is not Target.RADIO_CLIENT)
 
 
 def test_two_commands_under_way_are_no_fault() -> None:
     results = results_of(asking('CRC', 'Peer', stations=(1, 2)), Target.CLIENT, 'CRC')
     assert failures(results) == []
     assert [result.case.name for result in results if result.verdict is Verdict.SKIP] == [
-        'other-reply-ignored', 'bad-reply-not-used']
+        'other-reply-ignored', 'other-code-not-used', 'bad-reply-not-used']
 
 
 @cache
@@ -138,6 +140,6 @@ def test_every_case_cites_its_source() -> None:
     names = [(case.name, target) for case in CASES for target in case.targets]
     assert len({*names}) == len(names)
     assert {target: sum(target in case.targets for case in CASES) for target in Target} == {
-        Target.SLAVE: 40, Target.MASTER: 13, Target.PEER: 37, Target.CLIENT: 17,
+        Target.SLAVE: 40, Target.MASTER: 14, Target.PEER: 37, Target.CLIENT: 18,
         Target.RADIO: 32, Target.RADIO_CLIENT: 10}
     assert all(case.source.startswith(('M ', 'KF2 ', 'SLC ', 'ML11 ')) for case in CASES)

@@ -66,7 +66,10 @@ ALLOWED = [(target, habit, names) for targets, habit, names in [
     (PEER, Habit.EMBEDS_RESPONSES, set()), (PEER, Habit.NAKS_STRAY_ETX, set()),
     (MASTER, Habit.POLLS_BETWEEN_REPETITIONS, set()), (MASTER, Habit.POLLS_OTHERS, set()),
     (MASTER, Habit.POLLS_LATE, set()),
-    (MASTER, Habit.SENDS_TWO, {'other-reply-ignored'}), (MASTER, Habit.ONE_REPETITION, set()),
+    (MASTER, Habit.SENDS_TWO, {'other-reply-ignored', 'other-code-not-used'}),
+    (MASTER, Habit.ONE_REPETITION, set()),
+    # A target that ends the command as failed goes on like one that has used the reply.
+    (MASTER + (Target.CLIENT,), Habit.TAKES_ANY_CODE, {'other-code-not-used'}),
     (RADIO, Habit.REPEATS_REPLY, set()),
     (RADIO, Habit.COUNTS_NOTHING, {'duplicate-executed-once'}),
     (RADIO, Habit.SENDS_ON, set()), (SENDER, Habit.NO_REPETITION, {'repetitions-limited'}),
@@ -156,9 +159,10 @@ def test_end_without_a_fault_passes_as_stored_and_every_case_finds_one(target: T
         + ''.join(f'{line}\n' for line in result.transcript[:30]) for result in results))
     cases = {case.name for case in CASES if target in case.targets}
     found = {name for whose, _, name in FAULTS if whose is target}
-    # Two cases are tested below; 255 repetitions by radio take longer than a case may.
+    # Two cases are tested below, another can only be left open (ALLOWED); 255 repetitions by radio
+    # take longer than a case may.
     slow = {'repetitions-limited'} if target.is_radio else set()
-    assert cases - found == cases & (NOT_HERE | slow)
+    assert cases - found == cases & (NOT_HERE | slow | {'other-code-not-used'})
 
 
 @pytest.mark.parametrize('target', [Target.PEER, Target.CLIENT])

@@ -99,7 +99,8 @@ Habit = Enum('Habit', [
     'EOT_ENDS_COMMAND', 'NAKS_BAD_REPLY', 'IMPATIENT', 'POLLS_BETWEEN_REPETITIONS', 'POLLS_OTHERS',
     'POLLS_LATE', 'SENDS_TWO', 'ONE_REPETITION',
     'ACKS_BAD_REPLY',  # and polls again
-    'NAK_BEFORE_COMMAND', 'TAKES_ANY_TNS', 'TAKES_ANY_DESTINATION', 'REPEATS_FOR_EVER',
+    'NAK_BEFORE_COMMAND', 'TAKES_ANY_TNS', 'TAKES_ANY_DESTINATION', 'TAKES_ANY_CODE',
+    'REPEATS_FOR_EVER',
     'STOPS_AFTER_10',  # commands
     # Of a radio modem node or client.
     'ACKNOWLEDGES', 'ANSWERS_SYMBOLS', 'REPEATS_AFTER_NAK', 'REPLIES_FOR_OTHERS',
@@ -707,7 +708,9 @@ class _Asker:
         """Tell whether a message is taken for the reply to a command (M 6-3, 6-7)."""
         has = self._wire.has
         return (data[0] == command[1] or has(Habit.TAKES_ANY_DESTINATION)) and (
-            data[4:6] == command[4:6] or has(Habit.TAKES_ANY_TNS)) or has(Habit.TAKES_ANY_REPLY)
+            data[4:6] == command[4:6] or has(Habit.TAKES_ANY_TNS)) and (
+            data[2] == command[2] | 0x40 or has(Habit.TAKES_ANY_CODE)) or has(
+                Habit.TAKES_ANY_REPLY)
 
     def renewed(self, command: bytes) -> bytes:
         """Return a command as it is repeated."""
