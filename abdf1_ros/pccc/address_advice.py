@@ -12,7 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Corrections of texts that are not addresses: a letter for a digit, a bit after a dot."""
+"""
+Corrections of texts that are not addresses: a letter for a digit, a bit after a dot.
+
+They are advice alone; no text is read as if it were corrected.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +27,9 @@ _BIT_AFTER_DOT = re.compile(
     r'(?<![A-Z])(?P<word>(?:B|N|S|A|D)\d*[:;]\d+)\.(?P<bit>\d{1,2})(?!\d)', re.ASCII)
 # Letters O among digits.
 _LETTERS_O = re.compile(r'(?<=[:;./0-9-])O+(?![A-Z])', re.ASCII)
-
+# The digit 0, and 1 or a small L, in place of the letters O and I.
+_DIGIT_FOR_LETTER = re.compile(r'(?P<sign>[01|]|L(?=.*/))(?P<rest>\d?:[\d.]+(?:/\d+)?)',
+                               re.ASCII)
 
 # As an array of a Logix controller.
 _ARRAY = re.compile(r'(?P<file>[A-Z]+\d+)\[(?P<element>\d+)\]', re.ASCII)
@@ -38,6 +44,9 @@ def corrections(text: str) -> Iterator[tuple[str, str]]:
     if _LETTERS_O.search(text):
         yield ('that is the letter O where a digit should be',
                _LETTERS_O.sub(lambda match: '0' * len(match[0]), text))
+    if found := _DIGIT_FOR_LETTER.fullmatch(text):
+        letter = 'O' if found['sign'] == '0' else 'I'
+        yield f'"{found["sign"]}" stands where {letter} should', f'{letter}{found["rest"]}'
     if found := _ARRAY.fullmatch(text):
         yield 'an element stands after ":"', f'{found["file"]}:{found["element"]}'
     if found := _STATUS_BIT.fullmatch(text):

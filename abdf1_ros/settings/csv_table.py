@@ -37,7 +37,7 @@ import re
 from types import MappingProxyType
 
 from abdf1_ros.problems import ConfigurationError, Place, Problem
-from abdf1_ros.settings.hints import export_fault, hint, is_spreadsheet_error, row_hint
+from abdf1_ros.settings.hints import export_fault, hint, is_spreadsheet_error, row_hint, WORKBOOKS
 from abdf1_ros.text import shown
 
 _DELIMITERS = {',': 'comma', ';': 'semicolon', '\t': 'tab'}
@@ -53,8 +53,6 @@ _LARGEST = 10_000_000
 _LONGEST_LINE = 131_072
 # Similarity (0 to 1) from which a wrong name counts as a mistyped column.
 _ALIKE = 0.7
-# The first bytes of other files that were renamed to .csv: zip archives, old Excel files.
-_WORKBOOKS = (b'PK\x03\x04', bytes.fromhex('D0CF11E0A1B11AE1'))
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,7 +182,7 @@ def _read_text(path: str) -> str:
         is_looked_for = isinstance(error, FileNotFoundError) and not Path(path).is_absolute()
         where = f' in the folder {Path.cwd()}' if is_looked_for else ''
         raise Problem(path, f'cannot be read: {error.strerror or error}{where}') from None
-    if raw.startswith(_WORKBOOKS):
+    if raw.startswith(WORKBOOKS):
         raise Problem(path, 'is a workbook or a project of some program, not text; save what is '
                             'in it as "CSV UTF-8"')
     if len(raw) > _LARGEST:

@@ -22,6 +22,9 @@ import unicodedata
 
 from abdf1_ros.text import shown
 
+WORKBOOKS = (b'PK\x03\x04', bytes.fromhex('D0CF11E0A1B11AE1'))
+"""The first bytes of other files that were renamed to .csv: zip archives, old Excel files."""
+
 # Letters of other scripts, dashes and quotes that look like a character of ASCII.
 _ALIKE = str.maketrans(
     'АВЕКМНОРСТХІЅаеорсухіѕΑΒΕΖΗΙΚΜΝΟΡΤΥΧο‐‑‒–—−‘’“”⁄∕',
@@ -29,7 +32,7 @@ _ALIKE = str.maketrans(
 _MONTH = '(?:jan|feb|mar|mär|mrz|apr|may|mai|jun|jul|aug|sep|oct|okt|nov|dec|dez)[a-zä]*'
 _TIME = re.compile(
     rf'\d{{1,2}}:\d\d(?::\d\d)?(?: ?[ap]m)?|\d{{1,4}}[./-]\d{{1,2}}[./-]\d{{1,4}}|'
-    rf'\d{{1,2}}-\d{{1,2}}|\d{{1,2}}\.?[ -]{_MONTH}\.?(?:[ -]\d+)?|{_MONTH}\.?[ -]\d+',
+    rf'\d{{1,2}}-\d{{1,2}}|\d{{1,2}}(?:\.|\.?[ -]){_MONTH}\.?(?:[ -]\d+)?|{_MONTH}\.?[ -]\d+',
     re.ASCII | re.IGNORECASE)
 _WRAPPED = re.compile(r'="?(?P<formula>[^"]+)"?|\'(?P<text>.+)')
 _ERROR = re.compile(r'#(?:(?:N/A|NV|NAME\?|NOM\?)'

@@ -117,7 +117,6 @@ def test_tag_of_kepserver_becomes_a_row(
     ('"Char","N7:0",Char,1,RO,100,,,,,,,,,,"",', 'Data Type "Char" has no counterpart'),
     (f'"Long","N7:0 [{"9" * 5000}]",Word Array,1,RO,100,,,,,,,,,,"",',
      'an address has at most 100 characters'),
-    ('"Word","N7:0",Word,1,never,100,,,,,,,,,,"",', 'Client Access "never" has no counterpart'),
     (f'"Word","N7:0",{"x" * 100},1,RO,100,,,,,,,,,,"",',
      f'Data Type "{"x" * 100}" has no counterpart'),
     (f'"Word","N7:0",{"x" * 5000},1,RO,100,,,,,,,,,,"",',
@@ -282,9 +281,9 @@ def test_command_writes_a_map_once_and_says_how_to_go_on(
 @for_all(('text', 'expected'), [
     ('a,b\n1,2\n', 'is none of these: tags of KEPServerEX '), ('', 'is none of these: '),
     # What the columns of a list without a header mean is not guessed.
-    ('N7:0,SPEED,Conveyor speed\n', 'is none of these: '),
-    ('N7:0,Global,SPEED\nN7:1,2,LEVEL\n', 'is none of these: '),
-    ('N7:0,,SPEED\nN7:1\n', 'is none of these: '),
+    ('N7:0,SPEED OF LINE,x\n', 'has addresses, but no first row with names: write one, such as '),
+    ('N7:0,Global,SPEED\nN7:1,2,LEVEL\n', 'has addresses, but no first row with names'),
+    ('N7:0,RUN\nN7:1,RUN\n', 'has addresses, but no first row with names'),
     ('Tag,Command,Address,Station,PLC_Type\na,Read,N7:0,1,SLC\n', 'is a map already'),
     ('Tag,Command,Address,Station,PLC_Type,Via\na,Read,N7:0,1,SLC,\n', 'is a map already'),
     (f'Tag,Address\n{"x" * 200_000},N7:0\n', 'export.csv:2: field larger than field limit'),
@@ -314,10 +313,12 @@ def test_columns_of_a_list_are_found_by_their_names(tmp_path: Path) -> None:
         ('a', 'ReadWrite', 'int16'), ('b', 'Read', 'int32'), ('c', 'ReadWrite', 'float32'),
         ('d', 'Read', 'uint16')]
     assert len(left_out) == 1 and left_out[0].startswith(
-        '6: e: the type "LWORD" has no counterpart; it can be default, bool, ')
+        '6: e: Data Type "LWORD" has no counterpart (--ignore ')
     assert +import_map(str(tmp_path / 'export.csv'), STATION_2).remarks == {
-        '"perhaps" says nothing of access: made Read rows': 1}
-    assert not +import_map(str(tmp_path / 'export.csv'), Wanted(read_only=True)).remarks
+        'Read Only "perhaps" says nothing of access: made Read rows': 1,
+        'which of its two words comes first is not in the file: made Read rows (a column Word '
+        'Order: Low or High)': 1}
+    assert len(+import_map(str(tmp_path / 'export.csv'), Wanted(read_only=True)).remarks) == 1
 
 
 def test_list_that_says_nothing_of_access_is_only_read(tmp_path: Path) -> None:
@@ -342,7 +343,8 @@ def test_columns_of_a_list_are_given_by_options(
     assert '--tag "Name" is not a column; columns: Place, What' in capsys.readouterr().err
     assert main([*options, '--tag', 'what', '--description', 'Text']) == 0
     assert capsys.readouterr().err == (
-        'plc: 1 row: "yes" says nothing of access: made Read rows\n')
+        f'plc: {source}: columns that are not used: Tag\n'
+        'plc: 1 row: May "yes" says nothing of access: made Read rows\n')
     assert told(load_mappings(str(tmp_path / 'map.csv'))[0]) == [
         ('speed', 'ReadWrite', 'N7:0', 'Speed of 1'), ('up', 'Read', 'N7:1', '')]
 
@@ -402,7 +404,7 @@ def test_tags_of_rsview_and_factorytalk(tmp_path: Path, text: str) -> None:
     assert result.lines[1] == 'Press/Run,Read,B3:0/5,1,SLC,,,700,,,,,'
     bad = text.replace(',0.1,', ',ten,').replace('"D","F",0,100,0,1,', '"X","F",0,100,0,1,')
     assert imported(tmp_path, bad)[1] == ['7: Press/Speed: "ten" should be a number',
-                                          '10: Level: Native Type "x" has no counterpart']
+                                          '10: Level: Native Type "X" has no counterpart']
     text = text.replace('"PLC1","N7:1"', '"PLC2","N7:1"').replace('[PLC1]N7:1', '[PLC2]N7:1')
     with pytest.raises(ConfigurationError, match='rows of several PLCs: PLC1, PLC2'):
         imported(tmp_path, text)
@@ -514,17 +516,18 @@ def test_tags_of_ignition(tmp_path: Path) -> None:
     assert [cell_of(wait, column) for column in ('Tag', 'Command', 'Address')] == [
         'Line 1/Dry/Wait', 'Read', 'T4:1.ACC']
     assert left_out == [
-        '10: Root: scaleMode SquareRoot has no counterpart; Linear has',
-        '11: Any: opcItemPath {"bindType": "parameter"} has no address, as in ns=1;s=[PLC]N7:0']
+        '10: Root: scaleMode "SquareRoot" has no counterpart; Linear has',
+        '11: Any: opcItemPath "{"bindType": "parameter"}" has no address, as in ns=1;s=[PLC]N7:0']
     result = import_map(str(tmp_path / 'export.csv'), Wanted(read_only=True, period=700))
     assert result.lines[0] == 'Line 1/Speed,Read,N7:0,1,SLC,,,700,0.1,0,,,Conveyor north [m/min]'
     assert +result.ignored == {'tags that are not of a PLC': 1}
-    assert +result.remarks == {'readOnly is not in the file: made Read rows': 1}
+    result = import_map(str(tmp_path / 'export.csv'), Wanted())
+    assert +result.remarks == {'readOnly is empty: made Read rows': 1}
 
 
 def test_json_of_something_else_is_no_file_of_ignition(tmp_path: Path) -> None:
     for text in ('{"opcItemPath"', '[' * 100_000 + '"opcItemPath"', '{"tags": []}'):
-        with pytest.raises(ConfigurationError, match='is none of these'):
+        with pytest.raises(ConfigurationError, match='is JSON, but no Export Tags of Ignition'):
             imported(tmp_path, text)
 
 
@@ -549,8 +552,8 @@ def test_list_with_comments_and_whole_timers(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize('text, told', [
-    ('N7:35,Speed of line\nB3:0/0,Start\n', '; it has addresses, but no first row with names: '
-                                            'write one, such as Address,Tag'),
+    ('N7:35,Speed of line\nB3:0/0,Start\n', 'has addresses, but no first row with names: write '
+                                            'one, such as Address,Tag'),
     ('remark,"CSV-Import-Export"\n0.3\nTYPE,SCOPE,NAME\nTAG,,Speed\n',
      'has tags of a Logix controller, which are not addresses')])
 def test_file_that_is_not_known_is_told_with_a_cure(tmp_path: Path, text: str, told: str) -> None:

@@ -13,39 +13,21 @@
 # limitations under the License.
 
 """
-Tags of Ignition: its JSON export has folders with tags; opcItemPath is ns=1;s=[PLC]N7:0.
+Tags of Ignition: its JSON export has folders with tags.
 
-Each tag becomes a record, so that it is read like the row of any other file. A tag has the data
-type of its value in Ignition, not of the words in the PLC.
+Each tag becomes a record, so that it is read like the row of any other file.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 import json
-import re
 
-from abdf1_ros.cli.plc.exports.form import (
-    Cells,
-    cells_of,
-    Format,
-    FoundRow,
-    Ignored,
-    limited,
-    READ,
-    READ_WRITE,
-    Reader,
-    scaling,
-    Unusable,
-    Wanted,
-)
 from abdf1_ros.cli.plc.exports.records import one_line, Record
-from abdf1_ros.text import shown
 
 _MARK = 'opcItemPath'
 _FIELDS = (_MARK, 'valueSource', 'readOnly', 'documentation', 'engUnit', 'scaleMode', 'rawLow',
            'rawHigh', 'scaledLow', 'scaledHigh')
-_PATH = re.compile(r'(?:ns=\d+;s=)?\[(?P<node>[^]]+)\](?P<address>.+)')
 _MOST_FOLDERS = 50  # folders inside each other
 
 
@@ -57,7 +39,7 @@ def records_of(text: str) -> list[Record]:
         content = json.loads(text)
     except (ValueError, RecursionError):
         return []
-    records = [Record(1, ('ignition', *_FIELDS))]
+    records = [Record(1, ('name', *_FIELDS))]
     start = 0
     for name, tag in _tags(content, '', _MOST_FOLDERS):
         cells = [tag.get(field, '') for field in _FIELDS]
@@ -79,36 +61,3 @@ def _tags(node: object, folder: str, depth: int) -> Iterator[tuple[str, dict[str
             yield from _tags(node['tags'], name, depth - 1)
         else:
             yield name, node
-
-
-def _reader(path: str, records: Sequence[Record], wanted: Wanted) -> Reader | None:
-    if not records or records[0].cells != ('ignition', *_FIELDS):
-        return None
-    return lambda record: Ignored() if record is records[0] else _found(
-        dict(zip(('name', *_FIELDS), record.cells, strict=True)), wanted)
-
-
-FORMAT = Format('tags of Ignition (Export Tags, JSON)', _reader)
-
-
-def _found(tag: Cells, wanted: Wanted) -> FoundRow | Ignored:
-    if tag['valueSource'] != 'opc':
-        return Ignored('tags that are not of a PLC')
-    match = _PATH.fullmatch(tag[_MARK])
-    try:
-        if match is None:
-            raise Unusable(f'{_MARK} {shown(tag[_MARK])} has no address, as in ns=1;s=[PLC]N7:0')
-        scale: Cells = {}
-        if tag['scaleMode'] not in ('', 'Off'):
-            if tag['scaleMode'] != 'Linear':
-                raise Unusable(f'scaleMode {shown(tag["scaleMode"])} has no counterpart; Linear '
-                               'has')
-            scale = scaling([tag[end] for end in _FIELDS[-4:]])
-        command = {'true': READ, 'false': READ_WRITE}.get(tag['readOnly'], '')
-        return FoundRow(cells_of(
-            Tag=tag['name'], Command=limited(command or READ, wanted), Address=match['address'],
-            Period=str(wanted.period or ''), Description=' '.join(filter(None, (
-                tag['documentation'], f'[{tag["engUnit"]}]' * bool(tag['engUnit'])))), **scale),
-            match['node'], '' if command else 'readOnly is not in the file: made Read rows')
-    except Unusable as error:
-        raise Unusable(str(error), tag['name'], match and match['node']) from None

@@ -17,32 +17,23 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 import csv
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 import io
 
-from abdf1_ros.cli.plc.exports import (
-    factorytalk,
-    ignition,
-    intouch,
-    kepserver,
-    listing,
-    rslogix,
-)
-from abdf1_ros.cli.plc.exports.form import Cells, FoundRow, Ignored, Unusable, Wanted
-from abdf1_ros.cli.plc.exports.records import read_records, Record, text_of
+from abdf1_ros.cli.plc.exports.form import Cells, FoundRow, Ignored, read_row, Wanted
+from abdf1_ros.cli.plc.exports.ignition import records_of
+from abdf1_ros.cli.plc.exports.records import read_sheet, Record
+from abdf1_ros.cli.plc.exports.table import table_of
+from abdf1_ros.numbers import is_digits
 from abdf1_ros.problems import ConfigurationError, Place, Problem
 from abdf1_ros.settings.columns import NEEDED
 from abdf1_ros.settings.csv_table import Row
-from abdf1_ros.settings.hints import looks_like_address
 from abdf1_ros.settings.map_file import MOST_ROWS
 from abdf1_ros.settings.map_row import RowReader
+from abdf1_ros.settings.names import sanitise
 from abdf1_ros.text import printable, shown
-
-FORMATS = (kepserver.FORMAT, factorytalk.FORMAT, intouch.FORMAT, ignition.FORMAT, listing.FORMAT,
-           rslogix.FORMAT)
-"""The known formats; the first format that accepts a file reads it."""
 
 _COLUMNS = (*NEEDED, 'Length', 'Type', 'Period', 'Scale', 'Offset', 'Min', 'Max', 'Description')
 
@@ -52,48 +43,52 @@ class Import:
     """
     The rows of a map: ``lines`` of the new file, ``left_out`` the faults of rows left out.
 
-    ``ignored`` counts skipped rows by kind. ``remarks`` counts rows by the remark for the user.
+    ``ignored`` counts skipped rows by kind. ``remarks`` counts rows by the remark for the user,
+    and ``notes`` are about the whole file.
     """
 
+    columns: Sequence[str] = _COLUMNS
     count: int = 0
     lines: list[str] = field(default_factory=list)
     left_out: list[Problem] = field(default_factory=list)
     ignored: Counter[str] = field(default_factory=Counter)
     remarks: Counter[str] = field(default_factory=Counter)
+    notes: list[str] = field(default_factory=list)
 
     @property
     def text(self) -> str:
         """Return the map CSV."""
-        return '\n'.join([','.join(_COLUMNS), *self.lines, ''])
+        return '\n'.join([','.join(self.columns), *self.lines, ''])
 
 
 def import_map(path: str, wanted: Wanted) -> Import:
     """
     Return the map that is made of a file.
 
-    Raises ConfigurationError if the file cannot be read, or has no known form.
+    Raises ConfigurationError if the file cannot be read, has no known form, or has rows of PLCs
+    whose stations are not known.
     """
-    records = ignition.records_of(text_of(path)) or read_records(path)
-    reader = next(filter(None, (entry.reader(path, records, wanted) for entry in FORMATS)), None)
-    if reader is None:
-        raise ConfigurationError([Problem(path, _not_known(records))])
-    read: list[tuple[Record, FoundRow | Ignored | Unusable]] = []
-    for record in records:
-        try:
-            read.append((record, reader(record)))
-        except Unusable as error:
-            read.append((record, error))
-    _check_node(path, [found for _, found in read if isinstance(found, FoundRow)], wanted)
+    sheet = read_sheet(path)
+    sheet = replace(sheet, records=records_of(sheet.text) or sheet.records)
+    table = table_of(sheet, wanted)
+    rows = [(record, entry if isinstance(entry, Ignored) else read_row(
+        table.form, entry, wanted)) for record, entry in table.rows]
+    stations = _stations(path, [row for _, row in rows if isinstance(row, FoundRow)], wanted)
     result, seen = Import(), dict[str, int]()
-    for record, found in read:
-        if isinstance(found, Ignored):
-            result.ignored[found.what] += bool(found.what)
-        elif wanted.node is not None and found.node not in (None, wanted.node):
+    if any(isinstance(row, FoundRow) and 'Word_Order' in row.cells for _, row in rows):
+        result.columns = (*_COLUMNS, 'Word_Order')
+    result.notes += filter(None, [sheet.remark])
+    if table.unused:
+        result.notes.append(f'columns that are not used: {", ".join(map(shown, table.unused))}')
+    for record, row in rows:
+        if isinstance(row, Ignored):
+            result.ignored[row.what] += bool(row.what)
+        elif (there := stations(row)) is None:
             result.ignored['rows of other PLCs'] += 1
-        elif isinstance(found, Unusable):
-            _leave_out(result, path, record, found.tag, str(found))
+        elif row.fault:
+            _leave_out(result, path, record, row.cells, row.fault)
         else:
-            _add(result, seen, path, record, found, wanted)
+            _add(result, seen, path, record, row, list(_rows(row, there, wanted)))
         if result.count > MOST_ROWS:
             raise ConfigurationError([Problem(Place(path, record.line), (
                 f'the rows up to here make more than {MOST_ROWS} rows of a map, the most that it '
@@ -101,36 +96,71 @@ def import_map(path: str, wanted: Wanted) -> Import:
     return result
 
 
-def _not_known(records: Sequence[Record]) -> str:
-    """Return why records cannot be read, with advice."""
-    if any(record.first.lower() == 'remark' for record in records[:1]):
-        return ('has tags of a Logix controller, which are not addresses. Over DF1 the '
-                'controller has only the addresses of its "Map PLC/SLC Messages": write these '
-                'rows by hand')
-    text = 'is none of these: ' + '; '.join(entry.title for entry in FORMATS)
-    if any(looks_like_address(cell) for record in records for cell in record.cells):
-        text += '; it has addresses, but no first row with names: write one, such as Address,Tag'
-    return text
+_Heads = dict[str, str]
+"""The text before the tags of a row, by its station."""
 
 
-def _check_node(path: str, rows: Sequence[FoundRow], wanted: Wanted) -> None:
-    """Raise ConfigurationError if the user named none of several PLCs, or an unknown PLC."""
-    nodes = dict.fromkeys(row.node for row in rows)
-    named = ', '.join(shown(node) or '""' for node in nodes)
-    if wanted.node is None and len(nodes) > 1:
-        raise ConfigurationError([Problem(path, f'has rows of several PLCs: {named}; say which '
-                                                'is meant with --plc NAME')])
-    if wanted.node is not None and wanted.node not in nodes:
-        raise ConfigurationError([Problem(path, f'has no PLC "{shown(wanted.node)}"; it has '
-                                                f'{named}')])
+def _stations(path: str, rows: Sequence[FoundRow],
+              wanted: Wanted) -> Callable[[FoundRow], _Heads | None]:
+    """
+    Return the function that gives the stations of a row, None for a row that is not wanted.
+
+    Raises ConfigurationError if the user named none of several PLCs, or an unknown PLC.
+    """
+    good = [row for row in rows if not row.fault]
+    names = dict.fromkeys(_name(row) for row in good)
+    listed = ', '.join(shown(name) or '""' for name in names)
+    for name in wanted.station_of or ([] if wanted.node is None else [wanted.node]):
+        if name not in names:
+            raise ConfigurationError([Problem(path, f'has no PLC "{shown(name)}"; it has '
+                                                    f'{listed}')])
+    if wanted.node is not None:
+        names = {wanted.node: None}
+    has_stations = all(is_digits(row.station) for row in good) and not wanted.stations
+    in_one = {row.station for row in good if _name(row) in names} if has_stations else {''}
+    if not wanted.station_of and len(names) > len(in_one):
+        raise ConfigurationError([Problem(path, (
+            f'has rows of several PLCs: {listed}; choose one with --plc NAME, or give the station '
+            'of each with --station-of NAME=N,NAME=N'))])
+    heads = _heads_of(good, wanted)
+
+    def of(row: FoundRow) -> _Heads | None:
+        name = _name(row)
+        if wanted.station_of:
+            there = [str(wanted.station_of[name])] if name in wanted.station_of else []
+        elif wanted.node is not None and row.node is not None and name != wanted.node:
+            there = []
+        else:
+            there = [row.station] if has_stations else list(map(str, wanted.stations or (1,)))
+        if len(there) > 1:
+            return {station: f'station_{station}/' for station in there}
+        return {station: heads.get(name, '') for station in there} or None
+    return of
+
+
+def _name(row: FoundRow) -> str:
+    """Return what tells the PLC of a row from others."""
+    return row.node or row.station
+
+
+def _heads_of(rows: Sequence[FoundRow], wanted: Wanted) -> _Heads:
+    """Return the text before tags by PLC, if two PLCs have a tag of one name."""
+    plcs: dict[str, set[str]] = {}
+    for row in rows:
+        name = _name(row)
+        if wanted.node in (None, name) and (not wanted.station_of or name in wanted.station_of):
+            plcs.setdefault(sanitise(row.cells.get('Tag', '')), set()).add(name)
+    names = set().union(*plcs.values())
+    if all(len(found) < 2 for found in plcs.values()):
+        return {}
+    return {name: f'station_{name}/' if is_digits(name) else f'{name}/' for name in names}
 
 
 def _add(result: Import, seen: dict[str, int], path: str, record: Record, found: FoundRow,
-         wanted: Wanted) -> None:
+         rows: Sequence[Cells]) -> None:
     """Add the good rows of a record, or the reason why it is left out."""
-    cells = {'PLC_Type': wanted.plc_type.value, **found.cells}
     names, fault = [], ''
-    for row in _rows(cells, wanted):
+    for row in rows:
         reader = RowReader(Row(path, record.line, record.line, row, {}))
         if (mapping := reader.read()) is None:
             fault = '; '.join(fault.words() for fault in reader.faults)
@@ -139,30 +169,32 @@ def _add(result: Import, seen: dict[str, int], path: str, record: Record, found:
     if not fault and (clash := seen.get(names[0])):
         fault = f'the name {names[0]} is that of line {clash}'
     if fault:
-        _leave_out(result, path, record, cells.get('Tag', ''), fault)
+        _leave_out(result, path, record, found.cells, fault)
         return
     seen[names[0]] = record.line
     result.count += len(names)
-    result.remarks[found.remark] += bool(found.remark)
-    result.lines += map(_csv_line, _rows(cells, wanted))
+    result.remarks.update(dict.fromkeys(found.remarks, 1))
+    result.lines += (_csv_line(cells, result.columns) for cells in rows)
 
 
-def _leave_out(result: Import, path: str, record: Record, tag: str, text: str) -> None:
-    result.left_out.append(Problem(
-        Place(path, record.line), f'{shown(tag) or "without a name"}: {text}'))
+def _leave_out(result: Import, path: str, record: Record, cells: Cells, text: str) -> None:
+    tag, address = cells.get('Tag', ''), cells.get('Address', '')
+    name = (address if tag == sanitise(address) else tag) or 'without a name'
+    result.left_out.append(Problem(Place(path, record.line), f'{shown(name)}: {text}'))
     result.lines.append(printable(f'# line {record.line}: {",".join(record.cells)}: {text}'))
 
 
-def _rows(cells: Cells, wanted: Wanted) -> Iterator[Cells]:
+def _rows(found: FoundRow, heads: _Heads, wanted: Wanted) -> Iterator[Cells]:
     """Yield the row for each station."""
-    for station in wanted.stations:
-        head = f'station_{station}/' if 'Tag' in cells and len(wanted.stations) > 1 else ''
-        yield {**cells, 'Tag': head + cells.get('Tag', ''), 'Station': str(station)}
+    tag = found.cells.get('Tag', '')
+    for station, head in heads.items():
+        yield {'PLC_Type': wanted.plc_type.value, **found.cells, 'Tag': tag and head + tag,
+               'Station': station}
 
 
-def _csv_line(cells: Cells) -> str:
+def _csv_line(cells: Cells, columns: Sequence[str]) -> str:
     out = io.StringIO()
-    csv.writer(out, lineterminator='').writerow([cells.get(column, '') for column in _COLUMNS])
+    csv.writer(out, lineterminator='').writerow([cells.get(column, '') for column in columns])
     line = out.getvalue()
     # Without quotes a row whose Tag begins with # would be a comment.
     return line.replace(cells['Tag'], f'"{cells["Tag"]}"', 1) if line.startswith('#') else line

@@ -31,7 +31,8 @@ from abdf1_ros.cli.plc.exports.form import Wanted
 from abdf1_ros.cli.plc.exports.imported import import_map
 from abdf1_ros.cli.plc.options import add_folder, add_plc_type, DEFAULT_STATION, stations_option
 from abdf1_ros.cli.plc.session import complain
-from abdf1_ros.cli.terminal import called, EXIT_FAILED, number_option
+from abdf1_ros.cli.terminal import called, EXIT_FAILED, EXIT_USAGE, number_option
+from abdf1_ros.df1.stations import MAX_STATION
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.numbers import whole_number
 from abdf1_ros.paths import expanded
@@ -41,7 +42,7 @@ from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.columns import MAX_PERIOD
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.network import load_network
-from abdf1_ros.text import counted
+from abdf1_ros.text import counted, shown
 
 # Roles of the columns of a list.
 _COLUMN_ROLES = {
@@ -56,15 +57,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='the export or list: CSV; Ignition: JSON')
     add_folder(parser, 'map.csv')
     parser.add_argument('--station', metavar='LIST', type=stations_option, dest='stations',
-                        default=(DEFAULT_STATION,),
+                        default=(),
                         help='station of the PLC; or stations of several PLCs with the same '
-                             f'program, such as 1-4 (default: {DEFAULT_STATION})')
+                             f'program, such as 1-4 (default: {DEFAULT_STATION}, or the numbers '
+                             'in a column Station of the file)')
     parser.add_argument('--read-only', action='store_true', help='make all rows Read rows')
     for role, text in _COLUMN_ROLES.items():
         parser.add_argument(f'--{role}', metavar='COLUMN', dest=f'{role}_column',
                             help=f'for a list: {text}')
     parser.add_argument('--plc', metavar='NAME',
                         help='name of the PLC, for a file with several PLCs')
+    parser.add_argument('--station-of', metavar='NAME=N,...', type=_stations_by_name, default={},
+                        help='stations of several PLCs, by the names that the file has for them')
+    parser.add_argument('--ignore', metavar='COLUMN', action='append', default=[],
+                        help='for a list: a column that says nothing about the words in the PLC; '
+                             'may be given several times')
     parser.add_argument('--status', action='store_true',
                         help='also make rows for words of the status file without a symbol')
     parser.add_argument('--period', metavar='MS', default=0,
@@ -74,12 +81,32 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_plc_type(parser, 'family of the PLC; a MicroLogix is SLC (default: %(default)s)', 'SLC')
 
 
+def _stations_by_name(text: str) -> dict[str, int]:
+    """Return the stations of NAME=N,NAME=N."""
+    found: dict[str, int] = {}
+    for part in text.split(','):
+        name, _, number = (piece.strip() for piece in part.rpartition('='))
+        station = whole_number(number)
+        if not name or name in found or station is None or not 0 <= station <= MAX_STATION:
+            raise argparse.ArgumentTypeError(
+                f'"{shown(part)}" should be NAME=N, each name once, with a station from 0 to '
+                f'{MAX_STATION}')
+        found[name] = station
+    return found
+
+
 def run(options: argparse.Namespace) -> int:
     """Make map.csv of an export; print the rows that are left out."""
+    if options.station_of and (options.stations or options.plc is not None):
+        complain('--station-of gives the station of each PLC: not together with --station or '
+                 '--plc')
+        return EXIT_USAGE
     result = import_map(options.file, Wanted(
         PlcType(options.plc_type), options.stations, options.read_only, options.period,
         {role: name for role in _COLUMN_ROLES if (name := getattr(options, f'{role}_column'))},
-        options.plc, options.status))
+        options.plc, options.status, options.station_of, options.ignore))
+    for note in result.notes:
+        complain(f'{options.file}: {note}')
     for problem in result.left_out:
         complain(str(problem))
     for text, count in (+result.ignored).items():
