@@ -47,11 +47,14 @@ class _Failures:
     """
     The failures of a command in a row: ``count``, and the last ``error``.
 
-    ``replies`` is the number of replies of its station at the last failure. This failure ended at
-    ``when`` (clock value in s), after ``took`` seconds of the line.
+    The ``first`` failure and the failure that ended at ``when`` are clock values (s). The last one
+    took ``took`` seconds of the line. ``replies`` is the number of replies of its ``station`` at
+    the last failure.
     """
 
     error: LinkError
+    station: int
+    first: float
     count: int = 0
     replies: int = -1
     when: float = -math.inf
@@ -64,12 +67,19 @@ class OddCommands:
 
     A failure counts if the station has replied to another command since the failure before, or if
     a damaged reply came. After three failures in a row the command is odd. ``turns`` limits all
-    odd commands together to an eighth of the line's time. ``replies`` returns the number of
-    replies of a station.
+    odd commands together to an eighth of the line's time. Before, reads that fail get half of the
+    time that other reads want. ``replies`` returns the number of replies of a station.
+
+    These are clock values (s):
+
+    - ``next_suspect``: from when on a read that fails goes before others, which had the line since
+      the last failure as long as the failure took.
+    - ``message_failed_at``: when a message got no whole reply last.
     """
 
     def __init__(self, replies: Callable[[int], int]) -> None:
         self.turns = Probes(0.0)
+        self.next_suspect = self.message_failed_at = -math.inf
         self._replies = replies
         self.failed: dict[Hashable, _Failures] = {}
 
@@ -83,18 +93,32 @@ class OddCommands:
         found = self.failed.get(key)
         return found is not None and self._replies(station) > found.replies
 
-    def is_doubtful(self, key: Hashable, station: int) -> bool:
-        """Tell whether a command has failed, and its station has replied to none since."""
-        found = self.failed.get(key)
-        return found is not None and self._replies(station) == found.replies
+    def is_doubtful(self, station: int) -> bool:
+        """Tell whether a command to a station has failed, and it has replied to none since."""
+        replies = self._replies(station)
+        return any(found.station == station and found.replies == replies
+                   for found in self.failed.values())
+
+    def since(self, station: int) -> float:
+        """
+        Return since when (clock value, s) commands of a station fail that are not odd yet.
+
+        It is infinite if there are none. Those that have passed since are good.
+        """
+        return min((found.first for found in self.failed.values()
+                    if found.station == station and found.count < _ODD), default=math.inf)
 
     def is_odd(self, key: Hashable) -> bool:
         """Tell whether a command has failed so often that the fault is its own."""
         return self.failures(key) >= _ODD
 
     def rank(self, key: Hashable) -> int:
-        """Return the rank of a command that is odd, the least goes first: it may be new noise."""
+        """Return the rank of a command by its failures, the least goes first."""
         return min(self.failures(key), _ODD + 1)
+
+    def next(self, key: Hashable) -> float:  # noqa: A003
+        """Return from when on (clock value, s) a read goes before those that do not fail."""
+        return max(self.next_suspect, self.turns.next if self.is_odd(key) else -math.inf)
 
     def why(self, key: Hashable) -> str:
         """Return why a command has failed last, empty if it has not."""
@@ -112,7 +136,7 @@ class OddCommands:
             return -math.inf
         return found.when + max(_LEAST_PAUSE, share * found.took)
 
-    def judge(self, key: Hashable, station: int, error: LinkError, *,
+    def judge(self, key: Hashable, station: int, error: LinkError, now: float, *,
               is_counted: bool) -> LinkError:
         """
         Record that a command got no whole reply; return the error for its sender.
@@ -122,7 +146,7 @@ class OddCommands:
         if not isinstance(error, CommandTimeout | StationInactive) or not error.sent:
             return error
         replies = self._replies(station)
-        found = self.failed.setdefault(key, _Failures(error))
+        found = self.failed.setdefault(key, _Failures(error, station, now))
         is_its_own = replies > found.replies or error.cause in DAMAGED
         found.count += is_its_own and is_counted
         if is_its_own and found.count >= _ODD:
@@ -130,11 +154,19 @@ class OddCommands:
         found.replies, found.error = replies, error
         return error
 
-    def ended(self, key: Hashable, seconds: float, now: float, asker: Asker) -> None:
-        """Record that an odd command, good or not, has had the line for ``seconds`` until now."""
-        found = self.failed[key]
-        found.when, found.took = now, seconds
-        if asker is not Asker.OWN:
+    def spent(self, key: Hashable, seconds: float, now: float, asker: Asker, *,
+              was_odd: bool) -> None:
+        """Record that a command had the line for ``seconds`` until now, and has failed."""
+        if was_odd:
+            found = self.failed[key]
+            found.when, found.took = now, seconds
+        if asker is Asker.OWN:
+            return
+        if asker is Asker.MESSAGE:
+            self.message_failed_at = now
+        else:
+            self.next_suspect = now + seconds
+        if was_odd:
             self.turns.spent(seconds, now, asker)
 
     def passed(self, key: Hashable) -> None:

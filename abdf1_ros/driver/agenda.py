@@ -50,6 +50,7 @@ from abdf1_ros.driver.guests import GuestJob, GuestQueue
 from abdf1_ros.driver.interlocks.queue import Interlocks
 from abdf1_ros.driver.job_tasks import Job, JobTasks
 from abdf1_ros.driver.reads.silent import Reads
+from abdf1_ros.driver.write import key_of
 from abdf1_ros.driver.writes.queue import WriteQueue
 from abdf1_ros.driver.writes.under_way import WriteJob
 from abdf1_ros.plan.bounds import OURS_BESIDE_GUESTS, OWN_IN_A_ROW
@@ -222,7 +223,7 @@ class Agenda:
             return rewriting
         has_writes = self._writes.waiting or self._tasks.waiting
         if has_writes and self._writes_in_a_row < MAX_WRITES_IN_A_ROW \
-                and (write := self._write(now, busy)):
+                and not self._gives_way() and (write := self._write(now, busy)):
             return write
         guests = self._guests
         # At the end a guest could overwrite a fallback that is confirmed already.
@@ -243,6 +244,17 @@ class Agenda:
             self._share.counted.append(job.start(self._tasks, now))
         return job or has_writes and self._write(now, busy) \
             or has_guests and self._guest(now, busy) or None
+
+    def _gives_way(self) -> bool:
+        """
+        Tell whether reads go before the next message, because one of its row has failed.
+
+        These are the reads that were due when a message got no whole reply last.
+        """
+        odd, waiting = self._stations.odd, self._writes.waiting
+        return bool(odd.failed and waiting) \
+            and odd.failures(key_of(waiting[0].mapping, is_own=False)) > 0 \
+            and self._reads.find_due(odd.message_failed_at)
 
     def _after_death(self, now: float, busy: Container[int]) -> Job | None:
         """

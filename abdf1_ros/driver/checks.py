@@ -291,7 +291,8 @@ class Checks:
             return probe_from if station.active or check.kind is CheckKind.ECHO else math.inf
         if self._stations.odd.is_odd(check.key):
             return max(check.due, odd_from)
-        if self._stations.odd.is_doubtful(check.key, check.station):
+        odd = self._stations.odd
+        if odd.failures(check.key) and odd.is_doubtful(check.station):
             # Its failure may have made the station inactive. Others go first, or it would do so
             # again each time when the station comes back.
             return max(check.due, check.begun + min(check.period, _AGAIN))

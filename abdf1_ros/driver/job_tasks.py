@@ -71,8 +71,9 @@ class Job:
     - ``is_probe``: a silent station is asked whether it answers again.
     - ``is_own``: a heartbeat or a fallback, which no message has asked for.
     - ``key``: what fails if the job fails again and again, None for nothing: see ``df1.odd``.
+    - ``is_untested``: commands of its station have begun to fail, and it has not passed since.
     - ``is_suspect``: its station has replied to another command since the last one with this key
-      failed. So a failure does not blame the station.
+      failed; for an untested one, since any failed. So a failure does not blame the station.
     - ``is_whole``: with the reply that has come the job is done; another packet would follow in a
       turn of its own.
     - ``asker``: as what a job that is odd has its turn.
@@ -91,7 +92,7 @@ class Job:
     is_own = False
     is_whole = True
     key: Hashable = None
-    is_suspect = False
+    is_untested = is_suspect = False
     asker = Asker.IN_TURN
     blames = True
     answer_within = math.inf
@@ -113,7 +114,9 @@ class Job:
         self._has_failed = False
         if self.key is not None:
             odd = tasks.odd
-            self.is_suspect = bool(odd.failed) and odd.is_suspect(self.key, self.station)
+            self._had_failed = bool(odd.failed) and self.key in odd.failed
+            self.is_suspect = odd.is_suspect(self.key, self.station) if self._had_failed \
+                else self.is_untested and not odd.is_doubtful(self.station)
             self._is_odd = self.is_suspect and odd.is_odd(self.key)
             self.blames = not self.is_suspect
         self._tasks, self._steps = tasks, self.steps(now)
@@ -142,7 +145,7 @@ class Job:
         # A copy of the error for this job: a lost port fails all jobs with the same error.
         found = type(error)(*error.args, sent=self.sent, cause=error.cause)
         if self.key is not None:
-            found = self._tasks.odd.judge(self.key, self.station, found,
+            found = self._tasks.odd.judge(self.key, self.station, found, self._tasks.line.now,
                                           is_counted=not self._has_failed)
             self._has_failed = True
         self._advance(self._steps.throw, found)
@@ -152,8 +155,10 @@ class Job:
         if self.key is None:
             return
         odd, line = self._tasks.odd, self._tasks.line
-        if self._is_odd:
-            odd.ended(self.key, line.took(self.taken, line.now), line.now, self.asker)
+        if self._has_failed and self.key in odd.failed and (
+                self.is_suspect or not self._had_failed):
+            odd.spent(self.key, line.took(self.taken, line.now), line.now, self.asker,
+                      was_odd=self._is_odd)
         if self.is_whole and not self._has_failed:
             odd.passed(self.key)
 

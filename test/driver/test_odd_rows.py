@@ -21,6 +21,7 @@ a device server that doubles FF or swallows 11 and 13, a modem with a small buff
 
 from collections.abc import Callable
 from enum import Enum
+from itertools import pairwise, zip_longest
 from typing import Any
 
 from abdf1_ros.driver.settings import DriverSettings
@@ -218,6 +219,76 @@ def test_ten_odd_rows_have_the_eighth_together_in_turns(mode: str) -> None:
              if when > 60.0 and file_of(data) in files]
     assert {*tries} == {*files}
     assert len(bench.listener.reasons) == 10
+
+
+def longest_tries(mode: str) -> float:
+    """Return the longest time (s) of a command that gets no whole reply, and a message."""
+    return 1.4 if mode == 'Radio' else 1.2
+
+
+@LONG_MODES
+@pytest.mark.parametrize('fate', REASONS)
+@pytest.mark.parametrize('count', [1, 2, 10])
+def test_good_rows_wait_for_one_failed_try_while_the_odd_of_twenty_are_found(
+        mode: str, fate: Fate, count: int) -> None:
+    """Until its first good read a row may have to wait for the first try of each odd one."""
+    files, a_try = range(60, 60 + count), longest_tries(mode)
+    good = [make_mapping(f'N{file}:0', plc='SLC', length=8, period=500)
+            for file in range(20, 40 - count)]
+    odd = [make_mapping(f'N{file}:0', plc='SLC', length=4, period=500) for file in files]
+    plc = Plc(mode)
+    rows = [row for pair in zip_longest(good, odd) for row in pair if row] + [COMMAND]
+    bench = DriverBench(rows, network=network(mode), far=plc)
+
+    def publish() -> None:
+        bench.write(COMMAND, [len(bench.listener.results) % 1000])
+        bench.at(bench.clock() + 1.0, publish)
+
+    bench.run(10.0)
+    publish()
+    plc.fate = of_files(fate, *files)
+    bench.run(80.0)
+    first = [min(when for when, data in plc.tried if file_of(data) == file and when > 10.0)
+             for file in files]
+    # When each odd row has failed once, each good row has passed since or is about to.
+    for row in good:
+        times = [when for when in bench.listener.times(row) if when > min(first) + a_try]
+        most = 8 / 7 * bench.driver.points[row].stale_time + a_try
+        gaps = [after - before for before, after in pairwise([*times, 90.0])]
+        assert times[0] < max(first) + a_try + most
+        assert max(gaps) < most, row.tag
+    assert len(bench.listener.reasons) == count
+    assert len(bench.listener.changes) <= 2
+    outcomes = [result.outcome for result in bench.listener.results]
+    assert len(outcomes) >= 75 and outcomes.count(Outcome.WRITTEN) >= len(outcomes) - 1
+
+
+@LONG_MODES
+@pytest.mark.parametrize('count', [1, 2, 10])
+def test_good_rows_wait_for_one_failed_try_while_odd_messages_are_found(
+        mode: str, count: int) -> None:
+    files, a_try = range(60, 60 + count), longest_tries(mode)
+    good = [make_mapping(f'N{file}:0', plc='SLC', length=8, period=500) for file in range(20, 30)]
+    odd = [make_mapping(f'N{file}:0', 'Write', plc='SLC') for file in files]
+    plc = Plc(mode, fate=of_files(Fate.LOST, *files))
+    bench = DriverBench([*good, *odd, COMMAND], network=network(mode), far=plc)
+
+    def publish() -> None:
+        for row in (*odd, COMMAND):
+            bench.write(row, [len(bench.listener.results) % 1000])
+        bench.at(bench.clock() + 1.0, publish)
+
+    bench.run(5.0)
+    publish()
+    bench.run(75.0)
+    first = [min(when for when, data in plc.tried if file_of(data) == file) for file in files]
+    for row in good:
+        most = 8 / 7 * bench.driver.points[row].stale_time + a_try
+        times = [when for when in bench.listener.times(row) if when > max(first) + 2 * a_try]
+        times.append(80.0)
+        assert max(after - before for before, after in pairwise(times)) < most, row.tag
+    last = [result.outcome for result in bench.listener.results if result.mapping is COMMAND][-5:]
+    assert last == 5 * [Outcome.WRITTEN]
 
 
 @ALL_MODES

@@ -39,27 +39,28 @@ class Intervals:
     """
     The seconds between good reads: the ``last`` ones, the ``usual`` and the ``longest``.
 
-    An outage of the station does not count.
+    An outage of the station does not count. ``since`` is the clock value (s) of the last good read
+    after it, minus infinity before the first.
     """
 
     def __init__(self) -> None:
         self.last: float | None = None
         self.usual: float | None = None
         self.longest: float | None = None
-        self._since: float | None = None
+        self.since = -math.inf
 
     def good_read(self, now: float) -> None:
         """Record a good read."""
-        if self._since is not None:
-            self.last = now - self._since
+        if self.since > -math.inf:
+            self.last = now - self.since
             self.longest = max(self.last, self.longest or 0.0)
             usual = self.last if self.usual is None else self.usual
             self.usual = usual + SMOOTHING * (self.last - usual)
-        self._since = now
+        self.since = now
 
     def outage(self) -> None:
         """Record that a read has failed."""
-        self.last = self._since = None
+        self.last, self.since = None, -math.inf
 
 
 class _PacketRead(NamedTuple):

@@ -16,8 +16,12 @@
 All reads of a line: waiting ones in the order of ``queue``, and reads that are set aside.
 
 The reads of a station are set aside while it is inactive, or while it acknowledges commands
-without replying in time. Now and then one of them is sent as a probe. A read that fails while its
-station replies to others is odd: all these reads share a small part of the line.
+without replying in time. Now and then one of them is sent as a probe.
+
+A read that fails while its station replies to others is kept back (rule 29). So are all reads of
+the station that have not passed since: each of them may fail, too. After a failed one the others
+have the line as long as it took, so that they wait for one failure only. Those that are odd have
+a smaller share.
 """
 
 from __future__ import annotations
@@ -25,7 +29,6 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Container, Iterable, Set
 import math
-from operator import attrgetter
 
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.flights import Flight, WriteListener
@@ -38,16 +41,16 @@ class Reads(WriteListener):
     """
     Keep all read jobs; ``stations.probes`` decides when a silent station may be read.
 
-    ``queue`` has the jobs that wait for their time, ``aside`` the jobs of silent stations. ``odd``
-    has the odd jobs that are due and wait for their turn, the first one due first. Those that
-    have just become odd go before.
+    ``queue`` has the jobs that wait for their time, ``aside`` the jobs of silent stations.
+    ``kept_back`` has the jobs that are due and have failed, or may fail as others have. The one
+    with the fewest failures goes first, then the first one due.
     """
 
     def __init__(self, stations: ActiveStationList) -> None:
         self._stations = stations
         self.queue = ReadQueue()
         self.aside: dict[int, deque[ReadJob]] = {}
-        self.odd: deque[ReadJob] = deque()
+        self.kept_back: deque[ReadJob] = deque()
         self._put_off = 0.0  # no probe before it: no station replies (clock value, s)
 
     @property
@@ -61,8 +64,8 @@ class Reads(WriteListener):
 
     @property
     def has_odd(self) -> bool:
-        """Tell whether reads that fail while their station replies to others wait for a turn."""
-        return bool(self.odd)
+        """Tell whether odd reads wait for a turn."""
+        return any(self._stations.odd.is_odd(job.key) for job in self.kept_back)
 
     @property
     def poll_cycle(self) -> float | None:
@@ -97,7 +100,7 @@ class Reads(WriteListener):
 
     def begin(self, now: float) -> None:
         """Make all reads due at once: the port has been opened."""
-        self.odd.clear()
+        self.kept_back.clear()
         waiting = self.queue.jobs.difference(*self.aside.values())
         for job in sorted(waiting, key=lambda job: (job.due, job.ticket)):
             self.queue.put(job, now)
@@ -112,26 +115,23 @@ class Reads(WriteListener):
             self.find_due(now)  # a station may have become silent by another command
             if job := self._probe(now, busy):
                 return job
-        if self.odd and (job := self._next_odd(now, busy)):
+        if self.kept_back and (job := self._next_kept_back(now, busy, is_free=False)):
             return job
         passed_over, failed = [], self._stations.odd.failed
         while (job := self.queue.take(now)) is not None:
             is_usual = self._is_usual(job) if failed \
                 else self._stations.records[job.station].replies_in_time
-            if is_usual and job.station not in busy and not (failed and self._is_doubtful(job)):
+            if is_usual and job.station not in busy:
                 break
             self.queue.undo_turn()
             if is_usual:
                 passed_over.append(job)
             else:
                 self._keep_back(job)
-        if job is None and (doubtful := next(
-                (job for job in passed_over if job.station not in busy), None)):
-            job = self._instead_of(doubtful, now)
-            if job is doubtful:
-                passed_over.remove(job)
         if job is not None:
-            job.is_probe = False
+            job.is_probe = job.is_untested = False
+        elif self.kept_back:
+            job = self._next_kept_back(now, busy, is_free=True)
         for other in passed_over:
             self.queue.put(other, other.due)
         return job
@@ -147,7 +147,7 @@ class Reads(WriteListener):
             station = self._stations.records[job.station]
             is_proven = station.replies > 0 and self._is_usual(job)
             if is_proven and job.station not in busy:
-                job.is_probe = False
+                job.is_probe = job.is_untested = False
                 break
             self.queue.undo_turn()
             is_kept_waiting |= is_proven
@@ -171,62 +171,73 @@ class Reads(WriteListener):
         job = self._instead_of(min(jobs, key=self._failures), now)
         if job in jobs:
             jobs.remove(job)
-        job.due, job.is_probe = now, True
+        job.due, job.is_probe, job.is_untested = now, True, False
         if jobs:
             # moved to the end, so that the next probe goes to another station
             self.aside[station] = jobs
         return job
 
-    def _next_odd(self, now: float, busy: Container[int]) -> ReadJob | None:
-        """Return the next read of those that are odd, None while none may be sent."""
-        for job in [job for job in self.odd
-                    if not self._stations.records[job.station].replies_in_time]:
-            self.odd.remove(job)
-            self._set_aside(job)
-        if now < self._stations.odd.turns.next:
+    def _next_kept_back(self, now: float, busy: Container[int], *,
+                        is_free: bool) -> ReadJob | None:
+        """
+        Return the next read of those that are kept back, None while none may be sent.
+
+        If the line ``is_free``, no other read is due, and those that are not odd need no turn.
+        """
+        odd = self._stations.odd
+        for job in list(self.kept_back):
+            if not self._stations.records[job.station].replies_in_time:
+                self.kept_back.remove(job)
+                self._set_aside(job)
+            elif self._is_usual(job) or job not in self.queue.jobs:
+                self.kept_back.remove(job)
+                self.queue.put(job, job.due)
+        may_go = [job for job in self.kept_back if job.station not in busy and (
+            now >= odd.next(job.key) or is_free and not odd.is_odd(job.key))]
+        if not may_go:
             return None
-        free = [job for job in self.odd if job.station not in busy]
-        if not free:
-            return None
-        odd = min(free, key=lambda job: self._stations.odd.rank(job.key))
-        job = self._instead_of(odd, now)
-        if job is odd:
-            self.odd.remove(job)
-        job.is_probe = False
+        kept = min(may_go, key=lambda job: odd.rank(job.key))
+        job = self._instead_of(kept, now)
+        if job in self.kept_back:
+            self.kept_back.remove(job)
+        job.is_probe, job.is_untested = False, not self._failures(job)
         return job
 
     def _is_usual(self, job: ReadJob) -> bool:
         """Tell whether a read that is due may be sent as usual."""
         return self._stations.records[job.station].replies_in_time and (
-            job.is_unfinished or not self._stations.odd.is_odd(job.key))
+            job.is_unfinished or not self._failures(job) and not self._is_untested(job))
+
+    def _is_untested(self, job: ReadJob) -> bool:
+        """Tell whether a read has not passed since others of its station have begun to fail."""
+        return not job.is_on_demand and (
+            job.intervals.since < self._stations.odd.since(job.station) < math.inf)
 
     def _failures(self, job: ReadJob) -> int:
         return self._stations.odd.failures(job.key)
 
     def _instead_of(self, job: ReadJob, now: float) -> ReadJob:
         """
-        Return another read of the station, due or not, in the place of one that has failed.
+        Return another read, due or not, if the station has replied to none since a failure.
 
-        It shows whether the station replies. Otherwise the read that fails could go first again
-        and again, and make the station inactive each time.
+        It shows whether the station replies, so it is the one that has passed last. Otherwise one
+        that fails could go first again and again, and make the station inactive each time.
         """
-        if not self._is_doubtful(job):
+        if not self._stations.odd.is_doubtful(job.station):
             return job
-        others = [other for other in self.queue.waiting()
+        others = [other for other in (*self.queue.waiting(), *self.kept_back)
                   if other.station == job.station and not self._failures(other)]
         if not others:
             return job
-        other = min(others, key=attrgetter('due'))
-        self.queue.take_early(other, now)
+        other = max(others, key=lambda other: other.intervals.since)
+        if other not in self.kept_back:
+            self.queue.take_early(other, now)
         return other
-
-    def _is_doubtful(self, job: ReadJob) -> bool:
-        return self._stations.odd.is_doubtful(job.key, job.station)
 
     def _keep_back(self, job: ReadJob) -> None:
         """Keep a read that is not usual until its turn comes."""
         if self._stations.records[job.station].replies_in_time:
-            self.odd.append(job)
+            self.kept_back.append(job)
         else:
             self._set_aside(job)
 
@@ -238,13 +249,14 @@ class Reads(WriteListener):
             self.queue.take(now)
             self.queue.undo_turn()
             self._keep_back(job)
-        return False
+        return any(job.due <= now and not self._failures(job) for job in self.kept_back)
 
     def next_due(self) -> float:
         """Return when the next read or probe is due (clock value in s), infinite for never."""
         due = self.queue.next_due()
-        if self.odd:
-            due = min(due, self._stations.odd.turns.next)
+        odd = self._stations.odd
+        for job in self.kept_back:
+            due = min(due, odd.next(job.key) if odd.is_odd(job.key) else job.due)
         if not any(map(self._stations.may_be_asked, self.aside)):
             return due
         return min(due, self._next_probe())
