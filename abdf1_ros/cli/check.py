@@ -33,13 +33,13 @@ import sys
 from typing import TypedDict
 
 from abdf1_ros.cli.terminal import (
-    check_page,
     colour,
     command_parser,
     EXIT_INTERRUPTED,
     EXIT_USAGE,
     GREEN,
     number_option,
+    page_option,
     prepare_output,
     reason_of,
     RED,
@@ -281,7 +281,7 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument('map', metavar='MAP', nargs='?', type=expanded, help='the map CSV')
     parser.add_argument('--json', action='store_true',
                         help='print one JSON object, with every tag of every block')
-    parser.add_argument('--html', metavar='FILE', type=expanded,
+    parser.add_argument('--html', metavar='FILE', type=page_option,
                         help='also draw the poll cycle and the time that the Periods need, for a '
                              'browser')
     duration = number_option(f'ms from 0 to {MAX_PERIOD}', 0, MAX_PERIOD)
@@ -301,7 +301,6 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
         parser.error(f'{printable(options.net)} is not a folder, so a map CSV must follow')
     if options.html and options.map is None:
         parser.error('--html is for one net CSV and one map CSV')
-    check_page(parser, options.html)
     return options
 
 

@@ -43,14 +43,14 @@ import time
 from typing import TYPE_CHECKING
 
 from abdf1_ros.cli.terminal import (
-    check_page,
     command_parser,
     EXIT_FAILED,
     EXIT_USAGE,
     has_reader_left,
     is_port,
-    may_replace,
+    new_file,
     NoPort,
+    page_option,
     prepare_output,
     reason_of,
     run_command,
@@ -125,8 +125,11 @@ class Output:
             OUTPUTS.add(self._packets.file)
         self.has_failed = False
         self.is_unread = False
+        # A file that is asked for takes the place of the messages here; a live line shows both.
+        has_picture = bool(options.files and (options.html or options.report))
+        self._is_quiet = options.summary or has_picture and not options.json
         self._colour = sys.stdout.isatty() and 'NO_COLOR' not in os.environ
-        self._shows_progress = sys.stderr.isatty() and (options.summary or not sys.stdout.isatty())
+        self._shows_progress = sys.stderr.isatty() and (self._is_quiet or not sys.stdout.isatty())
         self._next_progress = time.monotonic() + PROGRESS_PERIOD
 
     def begin(self, settings: dict[str, str]) -> TrafficDecoder:
@@ -239,9 +242,11 @@ class Output:
                 self._packets = None
                 self.has_failed = True
                 _say(f'{reason_of(self._options.pcapng, error)}; no more packets are written')
-        if self._options.json and not self._options.summary:
+        if self._is_quiet:
+            return
+        if self._options.json:
             self._write(json_line(entry))
-        elif not self._options.summary:
+        else:
             self._write(text_line(entry, self._colour))
 
 
@@ -257,9 +262,9 @@ def _timeline(options: argparse.Namespace) -> Timeline:
     return Timeline(', '.join(options.files or options.tap or [options.port]), options.anonymous)
 
 
-def _is_bundle(path: Path) -> bool:
+def _bundle_option(path: str) -> str:
     from abdf1_ros.cli.sniff_report import is_bundle
-    return is_bundle(path)
+    return new_file(path, '--report', is_bundle)
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -301,14 +306,15 @@ def parse(args: Sequence[str] | None) -> argparse.Namespace:
                         help='duplex of the line (default: found from the traffic)')
     parser.add_argument('--json', action='store_true',
                         help='print one JSON object per line, the summary last')
-    parser.add_argument('--summary', action='store_true', help='print the summary only')
+    parser.add_argument('--summary', action='store_true',
+                        help='print the summary only, as --html and --report of files do')
     parser.add_argument('--save', metavar='FILE', type=expanded,
                         help='also write the traffic of a port or tap into a capture')
     parser.add_argument('--pcapng', metavar='FILE', type=expanded,
                         help='also write the traffic as packets, for Wireshark')
-    parser.add_argument('--html', metavar='FILE', type=expanded,
+    parser.add_argument('--html', metavar='FILE', type=page_option,
                         help='also draw the line as a timeline with its faults, for a browser')
-    parser.add_argument('--report', metavar='ZIP', type=expanded,
+    parser.add_argument('--report', metavar='ZIP', type=_bundle_option,
                         help='make a bundle of captures for a report: bytes, words, summary, '
                              'processors, versions')
     parser.add_argument('--settings', metavar='FILE', type=expanded, nargs='+', default=[],
@@ -332,10 +338,6 @@ def parse(args: Sequence[str] | None) -> argparse.Namespace:
         parser.error('--binary is for files')
     if options.report and (not options.files or options.binary):
         parser.error('--report is for captures: record one with --save, or trace_file of the node')
-    if options.report and not may_replace(options.report, _is_bundle):
-        parser.error(f'--report: {options.report} exists and is not a bundle of --report; give '
-                     'another name')
-    check_page(parser, options.html)
     if not options.report and (options.settings or options.conformance):
         parser.error('--settings and --conformance are for --report')
     if options.anonymous and not (options.report or options.html):

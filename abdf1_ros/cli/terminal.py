@@ -37,7 +37,7 @@ from typing import Any, NoReturn, TextIO
 
 from abdf1_ros.errors import PortLost
 from abdf1_ros.numbers import decimal_number, whole_number
-from abdf1_ros.paths import ShowVersion
+from abdf1_ros.paths import expanded, ShowVersion
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.signals import drop, limit_output
 from abdf1_ros.text import printable
@@ -211,11 +211,30 @@ def may_replace(path: str, is_ours: Callable[[Path], bool]) -> bool:
         return False
 
 
-def check_page(parser: argparse.ArgumentParser, path: str | None) -> None:
-    """End the program if ``path`` is a file that no --html has made."""
+def new_file(path: str, maker: str, is_ours: Callable[[Path], bool]) -> str:
+    """
+    Return the path of a file that will be written, for an option of argparse.
+
+    Bad places are found here, before the work: raises ArgumentTypeError if the file exists and
+    ``maker`` has not made it, or if it cannot be written.
+    """
+    path, place = expanded(path), Path(expanded(path))
+    if not may_replace(path, is_ours):
+        raise argparse.ArgumentTypeError(
+            f'{path} exists and was not made by {maker}; give another name')
+    error = errno.EISDIR if place.is_dir() else \
+        errno.ENOENT if not place.parent.exists() else \
+        errno.ENOTDIR if not place.parent.is_dir() else \
+        errno.EACCES if not os.access(place if place.exists() else place.parent, os.W_OK) else 0
+    if error:
+        raise argparse.ArgumentTypeError(f'{path}: {os.strerror(error)}')
+    return path
+
+
+def page_option(path: str) -> str:
+    """Return the path of a page that will be written; see ``new_file``."""
     from abdf1_ros.cli.lanes import is_page
-    if path and not may_replace(path, is_page):
-        parser.error(f'{printable(path)} exists and was not made by --html; give another name')
+    return new_file(path, '--html', is_page)
 
 
 def called(name: str) -> str:

@@ -340,7 +340,7 @@ def test_signal_ends_it_while_its_output_is_not_taken(
 def test_lost_port_ends_with_the_summary(tmp_path: Path) -> None:
     pty = Pty(tmp_path / 'line')
     saved = tmp_path / 'saved'
-    options = '--port', str(pty.name), '--save', str(saved), '--html', '/no/where'
+    options = '--port', str(pty.name), '--save', str(saved), '--html', '/dev/full'
     with Process('sniff', *options) as sniff:
         sniff.wait_for('sniff: ')
         pty.write(SAID[1])

@@ -214,11 +214,23 @@ def test_anonymous_timeline_has_no_values_and_no_names(tmp_path: Path, capsys: O
     assert 'STS 10' in page and 'STS 00' not in page
 
 
+def test_messages_are_printed_where_they_are_asked_for(tmp_path: Path, capsys: Output) -> None:
+    file = capture(tmp_path / 'line.cap', exchange(0.1, 1))
+    page, bundle = ('--html', str(tmp_path / 'x.html')), ('--report', str(tmp_path / 'x.zip'))
+    for args in (page, bundle, (*page, *bundle)):
+        assert call(main, capsys, file, *args).out.startswith('summary: ')
+    for args in ((), (*page, '--json')):
+        assert len(call(main, capsys, file, *args).out.splitlines()) > 5
+
+
 @pytest.mark.parametrize(('args', 'text'), [
     (('--anonymous',), '--anonymous is for --report and --html'),
     (('--html', 'line.html'), 'was not made by --html'),
-    (('--html', 'no/line.html'), 'sniff: --html: '),
-    (('--html', 'no/line.html', '--seconds', '1e-9'), 'sniff: --html: ')])
+    (('--html', 'no/line.html'), 'argument --html: no/line.html: No such file or directory'),
+    (('--html', 'line.html/x'), 'argument --html: line.html/x: Not a directory'),
+    (('--html', '.'), 'argument --html: .: Is a directory'),
+    (('--html', '/dev/full'), 'sniff: --html: /dev/full: No space left on device'),
+    (('--html', '/dev/full', '--seconds', '1e-9'), 'sniff: --html: /dev/full: No space')])
 def test_timeline_that_cannot_be_written_is_told(
         tmp_path: Path, capsys: Output, monkeypatch: pytest.MonkeyPatch, args: tuple[str, ...],
         text: str) -> None:
@@ -227,6 +239,7 @@ def test_timeline_that_cannot_be_written_is_told(
     said = call(main, capsys, *args, capture(Path('line.cap'), exchange(0.1, 1)))
     assert said.status == 2
     assert text in said.err
+    assert bool(said.out) == ('/dev/full' in args)  # all else is found before the decoding
     assert Path('line.html').read_text(encoding='utf-8') == 'mine'
 
 
