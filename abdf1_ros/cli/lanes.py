@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Pictures for a browser: blocks of time in lanes, as SVG in one HTML file.
+Pictures for a browser: blocks of time in lanes, and curves, as SVG in one HTML file.
 
 The file needs no network and runs no program: its Content-Security-Policy forbids both. All texts
 from outside go through ``text_of``.
@@ -25,11 +25,11 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from html import escape
-from itertools import accumulate
+from itertools import accumulate, pairwise
 import math
 from pathlib import Path
 
-from abdf1_ros.text import printable
+from abdf1_ros.text import cut, printable
 
 WIDTH = 1160  # pixels; the names of lanes take the first NAMES pixels
 NAMES = 110
@@ -37,7 +37,9 @@ _RIGHT = 20
 _GAP = 6
 _LETTER = 6.3  # pixels of a letter in a bar
 _LEAST = 1.6  # pixels: least width of a bar, so that it can be seen
-_TICKS = 10
+TICKS = 10  # about, on an axis
+_MARGIN = 4  # pixels above and below a curve
+_MOST_LETTERS = 17  # of a name
 _MARK = '<meta name="generator" content="abdf1_ros">'
 
 _STYLE = """
@@ -55,6 +57,7 @@ svg rect { stroke: #fff; stroke-width: .6; } svg .lane, svg .small { stroke: non
 .ask { fill: #2f6db5; } .answer { fill: #2e8b57; } .small { fill: #9aa5b1; }
 .wait { fill: #c9dcf2; } .odd { fill: #d9860a; }
 .bad { fill: #c62828; stroke: #6d0f0f; } .missing { fill: #fbe3e1; stroke: #c62828; }
+.curve { fill: none; stroke: #2f6db5; stroke-width: 1.3; stroke-linejoin: round; }
 table { border-collapse: collapse; margin: .6em 0; }
 td, th { padding: .15em .7em .15em 0; text-align: left; vertical-align: top;
   border-bottom: 1px solid #e3e7ec; } td.number, th.number { text-align: right; }
@@ -97,6 +100,18 @@ class Bar:
 
 
 @dataclass(frozen=True, slots=True)
+class Scale:
+    """The axis: ``start`` is at the left, and one unit has ``pixels``."""
+
+    start: float
+    pixels: float
+
+    def place(self, value: float) -> float:
+        """Return the horizontal place of a value."""
+        return NAMES + (value - self.start) * self.pixels
+
+
+@dataclass(frozen=True, slots=True)
 class Lane:
     """Bars in one row or several rows; each bar has the number of its row."""
 
@@ -112,65 +127,132 @@ class Lane:
     def height(self) -> int:
         return self.rows * self.row_height
 
+    def ground(self, top: int) -> str:
+        """Return what is below the grid."""
+        return _label(self.name, top + self.height / 2 + 4) + _ground(top, self.height)
+
+    def drawn(self, top: int, scale: Scale) -> Iterator[str]:
+        """Yield what is above the grid."""
+        for bar in self.bars:
+            yield from _bar(bar, top + bar.row * self.row_height, self.row_height, scale)
+
+
+@dataclass(frozen=True, slots=True)
+class CurveLane:
+    """
+    A number over time, on a scale from ``low`` to ``high``.
+
+    - ``pieces``: parts without a gap; a moment is its place on the axis, and its values in the
+      order in which they came: first, least, greatest, last.
+    - ``texts``: the lowest and the highest value as text.
+    - ``gaps``: bars for the time without a value.
+    """
+
+    name: str
+    title: str
+    pieces: Sequence[Sequence[tuple[float, Sequence[float]]]]
+    low: float
+    high: float
+    texts: tuple[str, str]
+    gaps: Sequence[Bar] = ()
+    height: int = 70
+
+    def ground(self, top: int) -> str:
+        """Return what is below the grid."""
+        low, high = self.texts
+        limits = ((low if low != high else '', top + self.height - 3), (high, top + 10))
+        return ''.join([
+            _label(self.name, top + self.height / 2 + 4, self.title), _ground(top, self.height),
+            *(f'<text x="{NAMES - 4}" y="{y}" text-anchor="end">{text_of(text)}</text>'
+              for text, y in limits)])
+
+    def drawn(self, top: int, scale: Scale) -> Iterator[str]:
+        """Yield what is above the grid."""
+        for gap in self.gaps:
+            yield from _bar(gap, top, self.height, scale)
+        path = ''.join(self._piece(piece, top, scale) for piece in self.pieces)
+        yield f'<path class="curve" d="{path}"><title>{text_of(self.title)}</title></path>'
+
+    def _piece(self, piece: Sequence[tuple[float, Sequence[float]]], top: int,
+               scale: Scale) -> str:
+        span, room = (self.high - self.low) or 1.0, self.height - 2 * _MARGIN
+        bottom = top + self.height - (_MARGIN if self.high > self.low else self.height / 2)
+        parts: list[str] = []
+        for place, values in piece:
+            heights = [f'{bottom - (value - self.low) / span * room:.1f}' for value in values]
+            parts.append(f'{"L" if parts else "M"}{scale.place(place):.1f} {heights[0]}')
+            parts += [f'V{now}' for before, now in pairwise(heights) if now != before]
+        # One moment alone has to be seen too.
+        return ''.join(parts) + (f'h{_LEAST}' if len(piece) == 1 else '')
+
 
 def text_of(text: str) -> str:
     """Return any text as HTML: all of it visible, none of it markup."""
     return escape(printable(text))
 
 
-def drawing(lanes: Sequence[Lane], start: float, end: float, unit: str, limit: float | None = None,
-            name: str = '') -> str:
+def drawing(lanes: Sequence[Lane | CurveLane], start: float, end: float, unit: str,
+            limit: float | None = None, name: str = '',
+            ticks: Sequence[tuple[float, str]] | None = None) -> str:
     """
     Return an SVG of lanes from ``start`` to ``end``, below them the axis with ``unit``.
 
-    ``limit`` gets a thick line. ``name`` is the target of links.
+    ``limit`` gets a thick line. ``name`` is the target of links. ``ticks`` are the places of the
+    grid with their texts; without them these are numbers.
     """
-    scale = (WIDTH - NAMES - _RIGHT) / ((end - start) or 1.0)
+    scale = Scale(start, (WIDTH - NAMES - _RIGHT) / ((end - start) or 1.0))
     height = sum(lane.height + _GAP for lane in lanes)
     parts = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height + 20}" '
              f'width="{WIDTH}" height="{height + 20}" role="img"'
              + (f' id="{text_of(name)}">' if name else '>')]
     tops = [*accumulate((lane.height + _GAP for lane in lanes), initial=0)]
-    parts += [_ground(lane, top) for lane, top in zip(lanes, tops, strict=False)]
-    parts += _axis(start, end, scale, height, unit)
+    parts += [lane.ground(top) for lane, top in zip(lanes, tops, strict=False)]
+    parts += _axis(numbers(start, end) if ticks is None else ticks, scale, height, unit)
     for lane, top in zip(lanes, tops, strict=False):
-        parts += _bars(lane, top, start, scale)
+        parts += lane.drawn(top, scale)
     if limit is not None:
-        place = NAMES + (limit - start) * scale
+        place = scale.place(limit)
         parts.append(f'<line class="limit" x1="{place:.1f}" x2="{place:.1f}" y1="0" '
                      f'y2="{height}"/>')
     return '\n'.join([*parts, '</svg>'])
 
 
-def _ground(lane: Lane, top: int) -> str:
-    height = lane.height
-    return (f'<text x="0" y="{top + height / 2 + 4:.1f}">{text_of(lane.name)}</text>'
-            f'<rect class="lane" x="{NAMES}" y="{top}" width="{WIDTH - NAMES - _RIGHT}" '
+def _ground(top: int, height: int) -> str:
+    return (f'<rect class="lane" x="{NAMES}" y="{top}" width="{WIDTH - NAMES - _RIGHT}" '
             f'height="{height}"/>')
 
 
-def _bars(lane: Lane, top: int, start: float, scale: float) -> Iterator[str]:
-    for bar in lane.bars:
-        left, width = NAMES + (bar.start - start) * scale, (bar.end - bar.start) * scale
-        above, height = top + bar.row * lane.row_height, lane.row_height
-        drawn = (f'<rect class="{bar.look.value}" x="{left:.1f}" y="{above + 1}" '
-                 f'width="{max(width, _LEAST):.1f}" height="{height - 2}">'
-                 f'<title>{text_of(bar.title)}</title></rect>')
-        yield f'<a href="#{text_of(bar.link)}">{drawn}</a>' if bar.link else drawn
-        label = next((text for text in bar.labels if len(text) * _LETTER + 6 < width), '')
-        if label:
-            yield (f'<text class="in" x="{left + 4:.1f}" y="{above + height / 2 + 4:.1f}">'
-                   f'{text_of(label)}</text>')
+def _label(name: str, y: float, title: str = '') -> str:
+    known = cut(name, _MOST_LETTERS)
+    told = f'<title>{text_of(title or name)}</title>' if title or known != name else ''
+    return f'<text x="0" y="{y:.1f}">{text_of(known)}{told}</text>'
 
 
-def _axis(start: float, end: float, scale: float, top: int, unit: str) -> Iterator[str]:
-    step = _step((end - start) / _TICKS)
-    for number in range(math.ceil(start / step), math.floor(end / step + 1e-9) + 1):
-        place = NAMES + (number * step - start) * scale
+def _bar(bar: Bar, top: int, height: int, scale: Scale) -> Iterator[str]:
+    left, width = scale.place(bar.start), (bar.end - bar.start) * scale.pixels
+    drawn = (f'<rect class="{bar.look.value}" x="{left:.1f}" y="{top + 1}" '
+             f'width="{max(width, _LEAST):.1f}" height="{height - 2}">'
+             f'<title>{text_of(bar.title)}</title></rect>')
+    yield f'<a href="#{text_of(bar.link)}">{drawn}</a>' if bar.link else drawn
+    label = next((text for text in bar.labels if len(text) * _LETTER + 6 < width), '')
+    if label:
+        yield (f'<text class="in" x="{left + 4:.1f}" y="{top + height / 2 + 4:.1f}">'
+               f'{text_of(label)}</text>')
+
+
+def _axis(ticks: Iterable[tuple[float, str]], scale: Scale, top: int, unit: str) -> Iterator[str]:
+    for at, text in ticks:
+        place = scale.place(at)
         yield (f'<line class="grid" x1="{place:.1f}" x2="{place:.1f}" y1="0" y2="{top + 4}"/>'
-               f'<text x="{place:.1f}" y="{top + 16}" text-anchor="middle">'
-               f'{number * step:.10g}</text>')
+               f'<text x="{place:.1f}" y="{top + 16}" text-anchor="middle">{text_of(text)}</text>')
     yield f'<text x="0" y="{top + 16}">{text_of(unit)}</text>'
+
+
+def numbers(start: float, end: float) -> Iterator[tuple[float, str]]:
+    """Yield about ten round numbers from ``start`` to ``end``, each with its text."""
+    step = _step((end - start) / TICKS)
+    for number in range(math.ceil(start / step), math.floor(end / step + 1e-9) + 1):
+        yield number * step, f'{number * step:.10g}'
 
 
 def _step(least: float) -> float:

@@ -23,10 +23,17 @@ from functools import partial
 
 from abdf1_ros.cli.plc import presence
 from abdf1_ros.cli.plc.asking import ask, mappings_of
-from abdf1_ros.cli.plc.data import Radix, tag_of, Tags, value_texts
+from abdf1_ros.cli.plc.data import tag_of, Tags
 from abdf1_ros.cli.plc.line import network_of
-from abdf1_ros.cli.plc.log_file import Cell, LogFile, LogLost, LogOutput, LogRow
-from abdf1_ros.cli.plc.options import RADIXES
+from abdf1_ros.cli.plc.log_file import (
+    ANSWERS_AGAIN,
+    Cell,
+    HEARD_AGAIN,
+    LogFile,
+    LogLost,
+    LogOutput,
+    LogRow,
+)
 from abdf1_ros.cli.plc.reading import NoValue, RepeatedReads, WatchedRead
 from abdf1_ros.cli.plc.session import complain, Session
 from abdf1_ros.cli.plc.targets import Targets
@@ -38,7 +45,7 @@ from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.rows import Rows
-from abdf1_ros.text import printable
+from abdf1_ros.text import printable, value_text
 
 # Without a reason a row is this late (s, and periods) only if the host or the program stood still.
 _STOOD_STILL = 5.0
@@ -52,15 +59,14 @@ class ValueLog(RepeatedReads):
     """
 
     def __init__(self, network: Network, mappings: Sequence[Mapping], period: float,
-                 output: LogFile | LogOutput, radix: Radix = Radix.DECIMAL,
-                 tags: Tags | None = None, record: str | None = None) -> None:
+                 output: LogFile | LogOutput, tags: Tags | None = None,
+                 record: str | None = None) -> None:
         self._output = output
-        self._radix = radix
         self._heads = {mapping: [*_heads(mapping, tags)] for mapping in mappings}
         self._gaps: dict[Mapping, datetime] = {}
         self._latest: dict[Mapping, datetime] = {}
         super().__init__(network, mappings, period, record)
-        self._again = 'heard again' if self._is_listening else 'answers again'
+        self._again = HEARD_AGAIN if self._is_listening else ANSWERS_AGAIN
         self._patience = {point.mapping: max(_STOOD_STILL, _STOOD_STILL * point.period)
                           for point in self._points}
 
@@ -90,7 +96,7 @@ class ValueLog(RepeatedReads):
                 'was set'))
             since = when
         reason = '' if since is None else self._again
-        cell, texts = _cells(mapping, what, self._radix)
+        cell, texts = _cells(mapping, what)
         for head, text in zip(self._heads[mapping], texts, strict=False):
             yield LogRow(when, mapping.station, *head, cell, text, reason)
 
@@ -106,11 +112,11 @@ def _heads(mapping: Mapping, tags: Tags | None) -> Iterator[tuple[str, str]]:
         yield str(mapping.place_of(number)), tag_of(mapping, number, tags)
 
 
-def _cells(mapping: Mapping, values: Values, radix: Radix) -> tuple[Cell, list[str]]:
+def _cells(mapping: Mapping, values: Values) -> tuple[Cell, list[str]]:
     if isinstance(values, str):
         return Cell.TEXT, [printable(values)]
     cell = Cell.FLOAT if mapping.message_type is ValueType.FLOAT32 else Cell.INTEGER
-    return cell, value_texts(mapping, values, radix)
+    return cell, [*map(value_text, values)]
 
 
 def log_values(options: argparse.Namespace, targets: Targets,
@@ -155,8 +161,8 @@ def _heard_rows(options: argparse.Namespace, targets: Targets, network: Network)
 
 def _log(options: argparse.Namespace, network: Network, mappings: Sequence[Mapping],
          targets: Targets, output: LogFile | LogOutput) -> int:
-    log = ValueLog(network, mappings, options.period, output, RADIXES[options.radix],
-                   targets.tags, options.record)
+    log = ValueLog(network, mappings, options.period, output, targets.tags,
+                   options.record)
     failed = log.run(options.count)
     if failed and not network.line_mode.only_listens:
         complain(presence.traffic(log.counters))

@@ -16,8 +16,8 @@
 The rows of ``plc log``: their forms, and a file that is continued.
 
 A row is one value, or the reason why there is none: time with UTC offset, station, address, tag,
-value, reason. The first value after a gap has a reason too, which begins with "answers again" or
-"heard again". A row without a station is about all addresses.
+value, reason. The first value after a gap has a reason too (``is_end_of_gap``). A row without a
+station is about all addresses.
 """
 
 from __future__ import annotations
@@ -41,6 +41,8 @@ from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.text import shown
 
 COLUMNS = 'time', 'station', 'address', 'tag', 'value', 'reason'
+
+ANSWERS_AGAIN, HEARD_AGAIN = 'answers again', 'heard again'
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _CONTINUED = 'the log goes on'
@@ -85,6 +87,11 @@ class LogForm:
     head: str
     line: Callable[[LogRow], str]
     first_line: re.Pattern[str]
+
+
+def is_end_of_gap(reason: str) -> bool:
+    """Return True for the reason of the first value after a gap."""
+    return reason in (ANSWERS_AGAIN, HEARD_AGAIN)
 
 
 def _csv_line(row: LogRow) -> str:

@@ -165,7 +165,6 @@ def add_addresses(parser: argparse.ArgumentParser, has_radix: bool = True) -> No
                         help='a map CSV; its tags are shown beside the addresses')
     parser.add_argument('--record', metavar='FILE', type=expanded,
                         help='record all bytes of the line in a capture file, for "sniff"')
-    parser.set_defaults(radix='dec')
     if has_radix:
         parser.add_argument('--radix', type=str.lower, choices=tuple(RADIXES), default='dec',
                             help='number base of whole numbers (default: %(default)s)')

@@ -40,13 +40,15 @@ VERBS = {
     'write SLC': 'write N7:0 1 --station 2 --yes --plc-type SLC',
     'watch': 'watch N7:0 --station 2 --count 1 --period 0.05',
     'watch SLC': 'watch N7:0 --station 2 --count 1 --period 0.05 --plc-type SLC',
+    'log': 'log N7:0 --station 2 --count 1 --period 0.05',
+    'log SLC': 'log N7:0 --station 2 --count 1 --period 0.05 --plc-type SLC',
     'status': 'status 2', 'ping': 'ping 2 --count 1', 'scan': 'scan 2',
     'detect': 'detect --baud 9600 --duplex half --check CRC --stations 2',
     'init': 'init --baud 9600 --duplex half --check CRC --stations 2 --into {}/new',
     'files': 'files 2 --files 7', 'files SLC': 'files 2 --files 7 --plc-type SLC',
     'clock': 'clock 2', 'clock SLC': 'clock 2 --plc-type SLC',
     'set': 'clock 2 --set --yes', 'set SLC': 'clock 2 --set --yes --plc-type SLC'}
-WITHOUT_LINE = {'ports', 'import'}
+WITHOUT_LINE = {'ports', 'import', 'plot'}
 FINDING = 'scan', 'detect', 'init'  # a station that refuses is one that is there
 SENDING = 'write SLC', 'set SLC'  # the write is the first command
 PATIENT, IMPATIENT = ('--timeout', '3000'), ('--timeout', '20')
@@ -166,6 +168,9 @@ def test_output_that_takes_nothing(tmp_path: Path, capsys: Output,
         reason = 'No space left on device' if is_full else 'Broken pipe'
         if verb.split()[0] in ('write', 'set'):
             expected = 0, [f'plc: written, but that cannot be printed: {reason}']
+        elif verb.startswith('log') and is_full:
+            expected = 1, [f'plc: the output: {reason}; the log ends here, after 0 rows of this '
+                           'run']
         else:
             expected = (2, [f'plc: cannot print: {reason}']) if is_full else (0, [])
         warnings = [line for line in told(said) if 'file directory cannot be read' in line]
@@ -197,6 +202,7 @@ def test_interrupt_ends_it_at_once(tmp_path: Path, verb: str) -> None:
         process.send(signal.SIGINT)
         status = process.result()
     line.close()
-    is_told = verb in ('ping', *SENDING)
-    expected = {'ping': 1, 'watch SLC': 0, 'write SLC': 3, 'set SLC': 3}.get(verb, 130)
+    is_told = verb in ('ping', 'log SLC', *SENDING)
+    expected = {'ping': 1, 'watch SLC': 0, 'log SLC': 0, 'write SLC': 3, 'set SLC': 3}.get(
+        verb, 130)
     assert (status, len(process.lines)) == (expected, is_told), process.text

@@ -303,6 +303,8 @@ def test_log_goes_to_a_file_and_to_the_output(plc: Plc, tmp_path: Path) -> None:
         said = plc(*words, 'N7:0', '--count', '1')
         assert (said.status, said.lines[0]) == (0, HEAD)
         assert said.lines[1].partition(',')[2] == '1,N7:0,,1200,'
+    assert plc('watch', 'N7:0', '--csv', '--radix', 'hex') == Said(
+        2, '', 'plc: --radix: is for a table; --csv has decimal numbers\n')
     row = json.loads(plc('log', 'N7:0', '--count', '1', '--format', 'jsonl').lines[0])
     assert (row['address'], row['value'], row['reason']) == ('N7:0', 1200, '')
 

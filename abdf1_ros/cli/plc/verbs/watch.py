@@ -35,6 +35,7 @@ from abdf1_ros.cli.plc.session import complain, Session
 from abdf1_ros.cli.plc.targets import Targets, to_read
 from abdf1_ros.cli.plc.watch import LiveValues
 from abdf1_ros.cli.terminal import EXIT_FAILED
+from abdf1_ros.problems import ConfigurationError, Problem
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -48,6 +49,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Read the addresses again and again, and show their values."""
     targets = to_read(options)
+    if options.csv and options.radix != 'dec':
+        raise ConfigurationError([Problem('--radix', 'is for a table; --csv has decimal numbers')])
     if options.csv:
         return log_values(options, targets, LogOutput(FORMS['csv']))
     return ask(options, partial(_watch, targets=targets), targets)
