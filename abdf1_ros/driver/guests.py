@@ -116,12 +116,19 @@ class Guest:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GuestCommand:
-    """A command of a guest, when it came (clock value in s), and the receiver of the reply."""
+    """
+    A command of a guest, when it came (clock value in s), and the receiver of the reply.
+
+    - ``patience``: longest time (s) that the guest itself waits.
+    - ``is_wanted``: tells, in the link's thread, whether the guest that asked is still there.
+    """
 
     guest: Guest
     packet: Packet
     requested: float
     answer: Callable[[Packet], None]
+    patience: float = math.inf
+    is_wanted: Callable[[], bool] = lambda: True
 
 
 class GuestJob(Job):
@@ -196,6 +203,11 @@ class GuestQueue:
         if not self.inbox.put(command):
             self._give_up(command, _NOT_CONNECTED)
 
+    def refuse(self, command: GuestCommand) -> None:
+        """Refuse a command that its place cannot keep, or has kept too long."""
+        command.guest.commands += 1
+        self._give_up(command, _NO_BUFFER)
+
     def begin(self) -> None:
         """Take commands: the port is open."""
         self.inbox.open()
@@ -221,7 +233,8 @@ class GuestQueue:
                 self.waiting.append(guest)
             self._look()
             station = self._rules.station_of(command.packet.dst)
-            if not self._unanswered.may_be_sent(station, command.packet, now):
+            if not command.is_wanted() or not self._unanswered.may_be_sent(
+                    station, command.packet, now):
                 self._give_up(command, _NO_BUFFER)
                 continue
             if self._stations[station].last_heard is None:
@@ -256,7 +269,7 @@ class GuestQueue:
 
     def expiry(self, command: GuestCommand) -> float:
         """Return the clock value (s) from which a command is too old."""
-        return command.requested + self._patience
+        return command.requested + min(self._patience, command.patience)
 
     def expire(self, now: float) -> None:
         """Refuse the commands that have waited too long."""

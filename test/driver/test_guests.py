@@ -141,6 +141,40 @@ def test_command_that_has_become_too_old_after_it_was_taken_is_not_sent() -> Non
     assert [reply.sts for reply in later] == [0x04]
 
 
+def test_command_of_a_program_that_has_left_is_not_sent_nor_one_that_it_no_longer_waits_for(
+        ) -> None:
+    bench = bench_of()
+    guest, told = Guest('eip', ShareAccess.WRITE), list[tuple[int, int]]()
+    sent = bench.driver.counters.commands_sent
+    is_there = True
+
+    def ask(tns: int, patience: float, is_wanted: Callable[[], bool]) -> None:
+        bench.driver.guests.put(GuestCommand(
+            guest, Packet(1, 9, 0x0F, 0, tns, WRITE_N7), bench.clock(),
+            lambda reply: told.append((tns, reply.sts)), patience, is_wanted))
+
+    ask(1, 9.0, lambda: is_there)
+    job = bench.driver.guests.next(bench.clock(), ())
+    assert job is not None and job.expires < bench.clock() + 9.0
+    job.ended(CommandExpired(sent=False))
+    ask(2, 9.0, lambda: is_there)
+    ask(3, 0.2, lambda: True)
+    is_there = False
+    job = bench.driver.guests.next(bench.clock(), ())
+    assert job is not None and job.asked.packet.tns == 3
+    assert job.expires == pytest.approx(bench.clock() + 0.2)
+    job.ended(CommandExpired(sent=False))
+    ask(4, 0.2, lambda: True)
+    bench.driver.guests.expire(bench.clock() + 0.2)
+    assert told == [(number, 0x01) for number in (1, 2, 3, 4)]
+    bench.driver.guests.refuse(GuestCommand(
+        guest, Packet(1, 9, 0x0F, 0, 5, WRITE_N7), bench.clock(),
+        lambda reply: told.append((5, reply.sts))))
+    assert told[4:] == [(5, 0x01)]
+    assert (guest.commands, guest.unanswered) == (5, 5)
+    assert bench.driver.counters.commands_sent == sent
+
+
 def test_what_is_not_allowed_is_refused_at_once_and_changes_nothing() -> None:
     bench = bench_of()
     program = Program(bench)
