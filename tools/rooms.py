@@ -89,7 +89,7 @@ ROOMS = (
     Room(('ports',), 'ports, the thread that runs a link, recording and listening',
          ('errors', 'line_names', 'df1', 'settings', 'sniffer'), is_pure=False),
     Room(('share',), 'the line shared with other programs: a place for each guest',
-         ('df1', 'settings', 'driver', 'ports'), is_pure=False),
+         ('text', 'df1', 'cip', 'settings', 'driver', 'ports'), is_pure=False),
     Room(('simulator',), 'simulated PLCs and the commands that they take',
          ('errors', 'counters', 'problems', 'numbers', 'text', 'df1', 'pccc', 'settings')),
     Room(('conform',), 'cases of the manual, run against the far end of a line', ()),

@@ -61,7 +61,7 @@ from abdf1_ros.settings.columns import MAX_PERIOD
 from abdf1_ros.settings.heartbeats import LONGEST_END
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Command, Mapping
-from abdf1_ros.settings.network import load_network, Network
+from abdf1_ros.settings.network import load_network, Network, share_problems
 from abdf1_ros.settings.rows import Rows
 from abdf1_ros.settings.scaling import Scaling
 from abdf1_ros.settings.share import share_places
@@ -107,7 +107,7 @@ def examine(net_file: str, map_file: str,
         found.problems += error.problems
     if found.network is not None:
         found.mappings, problems = usable_rows(found.mappings, found.network, default_period)
-        found.problems += problems
+        found.problems += [*problems, *share_problems(found.network, found.mappings.stations)]
     return found
 
 

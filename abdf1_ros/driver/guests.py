@@ -82,8 +82,8 @@ class GuestListener:
     def was_unanswered(self, guest: Guest, command: Packet, sts: int) -> None:
         """Take a command that got an STS of ours in place of a reply of the PLC."""
 
-    def turned_away(self, guest: Guest, other: str) -> None:
-        """Take the address of a program that came to a place of another program."""
+    def turned_away(self, guest: Guest, other: str, why: str) -> None:
+        """Take the address of a program that a place did not take, and why."""
 
 
 @dataclass(slots=True, eq=False)

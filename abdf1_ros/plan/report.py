@@ -49,6 +49,7 @@ from abdf1_ros.settings.share import share_places
 from abdf1_ros.text import counted, first, milliseconds
 
 _HIGH_LOAD = 0.8
+_GUEST_COMMAND, _GUEST_REPLY = 6, 40  # bytes after TNS: a read of 20 words of an SLC
 _WORTH_SAVING = 0.05  # of the poll cycle
 _NAMED_TAGS = 3
 _LONG_TIMEOUT = 10_000  # ms
@@ -433,7 +434,16 @@ def _load_remarks(report: Report) -> Iterator[Remark]:
         yield Remark(RemarkKind.LOAD, (
             'while guests (Share) ask, a quarter of the time may be theirs: the periods then need '
             f'{load * (1 + 1 / OURS_BESIDE_GUESTS):.0%} of the time that is left, and the '
-            'poll cycle is up to a third longer'))
+            f'poll cycle is up to a third longer; {_guest_rate(report)}'))
+
+
+def _guest_rate(report: Report) -> str:
+    """Return how many reads of guests the line takes, alone and beside our own reads."""
+    seconds = report.answer_time + forecast.line_model(report.network).transaction_time(
+        _GUEST_COMMAND, _GUEST_REPLY)
+    beside = seconds * (1 + OURS_BESIDE_GUESTS)
+    return (f'of their reads of {_GUEST_REPLY // 2} words the line takes {1 / seconds:.0f} a '
+            f'second, and {1 / beside:.0f} beside rows with Period 0')
 
 
 def _again_remarks(report: Report) -> Iterator[Remark]:

@@ -47,9 +47,10 @@ _SILENT = 30.0
 # TCP probes a silent client after 4 s, then every 2 s. After three probes without an answer the
 # client counts as gone. Bytes sent to it have to arrive within the same 10 s.
 _TCP = socket.IPPROTO_TCP
-_OPTIONS = ((_TCP, socket.TCP_NODELAY, 1), (socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1),
-            (_TCP, socket.TCP_KEEPIDLE, 4), (_TCP, socket.TCP_KEEPINTVL, 2),
-            (_TCP, socket.TCP_KEEPCNT, 3), (_TCP, socket.TCP_USER_TIMEOUT, 10_000))
+TCP_OPTIONS = (
+    (_TCP, socket.TCP_NODELAY, 1), (socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1),
+    (_TCP, socket.TCP_KEEPIDLE, 4), (_TCP, socket.TCP_KEEPINTVL, 2), (_TCP, socket.TCP_KEEPCNT, 3),
+    (_TCP, socket.TCP_USER_TIMEOUT, 10_000))
 
 
 class Endpoint(Protocol):
@@ -340,7 +341,7 @@ class TcpEndpoint:
                 client, _ = self._listener.accept()
             except BlockingIOError:
                 raise NoClient from None
-        for level, option, value in _OPTIONS:
+        for level, option, value in TCP_OPTIONS:
             client.setsockopt(level, option, value)
         self._heard = monotonic()
         return _ClientPort(client, self._listener, partial(self._look, client))

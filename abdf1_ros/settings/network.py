@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from collections import ChainMap
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from collections.abc import Mapping as MappingType
 from dataclasses import dataclass, field, fields, replace
 import re
@@ -49,7 +49,7 @@ from abdf1_ros.problems import ConfigurationError, Place, Problem
 from abdf1_ros.settings import BAUD_RATES, PARITIES
 from abdf1_ros.settings.csv_table import read_table, Row
 from abdf1_ros.settings.hints import hint
-from abdf1_ros.settings.share import share_places
+from abdf1_ros.settings.share import share_places, station_of
 from abdf1_ros.settings.station_lists import octal_remarks, parse_stations
 from abdf1_ros.text import shown
 
@@ -162,7 +162,8 @@ class Network:
     polling: str = _net('Polling', 'Message', 'how a master polls', _named(*POLLING_MODES))
     share: str = _net(
         'Share', '', 'places where other programs connect to share the line, separated by blanks: '
-        'pty:/name, tcp:port, tcp:address:port, or a serial device')
+        'pty:/name, tcp:port, tcp:address:port, eip:port?station=N for EtherNet/IP, or a serial '
+        'device')
     share_access: str = _net(
         'Share_Access', 'Read', 'what programs at these places may do',
         _named('Read', 'Write', 'All'))
@@ -175,6 +176,8 @@ class Network:
     listen_port: str = _net(
         'Listen_Port', '', 'Mode Listen: the second device, if each direction of the line has its '
         'own wire')
+    # Where the places are written.
+    share_at: Place | str = field(default='Share', compare=False)
     # Remarks about the way the file is written.
     remarks: tuple[Problem, ...] = field(default=(), compare=False)
 
@@ -332,9 +335,20 @@ def make_network(values: MappingType[str, tuple[str, Place | str]],
                 f'Share: "{shown(place.text)}" is the port of the line, {shown(port)}; a guest '
                 'needs another port'))])
     given = {FIELDS[name].column for name in values}
+    checked['share_at'] = share if 'share' in values else base.share_at
     checked['remarks'] = tuple(
         remark for remark in base.remarks if remark.place.column not in given)
     return Network(**checked)
+
+
+def share_problems(network: Network, stations: Sequence[int]) -> Iterator[Problem]:
+    """Yield the faults of places that do not go with the rows of a map, by their stations."""
+    for place in share_places(network.share):
+        if place.is_ethernet:
+            try:
+                station_of(place, stations)
+            except ValueError as error:
+                yield Problem(network.share_at, f'Share: {error}')
 
 
 def port_advice(text: str) -> str:

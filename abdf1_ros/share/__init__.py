@@ -15,6 +15,6 @@
 """
 Sharing the PLC's only port: a guest finds the PLC at each place of the column Share.
 
-``guest_line`` is one such place: a full-duplex node with its own thread. The driver carries out
-the guest's commands (``driver.guests``).
+``guest_line`` is one such place: a full-duplex node with its own thread. ``ethernet_place`` is one
+for many programs that speak EtherNet/IP. The driver carries out the commands (``driver.guests``).
 """

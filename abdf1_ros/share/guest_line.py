@@ -12,13 +12,14 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""One place where a guest connects: to the guest it is the PLC."""
+"""Places where guests connect: to the guest each is the PLC."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 import math
+from typing import Protocol
 
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.machine import LineTiming, Machine, MOST_LATE, Procedure
@@ -35,10 +36,48 @@ from abdf1_ros.ports.endpoints import Endpoint, PtyPlace, SerialEndpoint, TcpEnd
 from abdf1_ros.ports.link_thread import LinkThread, PortKind, PortState
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.settings.network import Network
-from abdf1_ros.settings.share import SharePlace
+from abdf1_ros.settings.share import SharePlace, station_of
 
 # Poll interval (s) for new programs at a place; it also limits the error of a command's age.
 _GLANCE = 0.1
+
+
+class GuestPlace(Protocol):
+    """A place of Share; ``guest`` has counted what its programs have sent."""
+
+    guest: Guest
+
+    @property
+    def state(self) -> str:
+        """Return the state of the place, as a text for users."""
+
+    @property
+    def fault(self) -> str:
+        """Return why no program can connect; empty if a program can."""
+
+    @property
+    def waiting(self) -> int:
+        """Return how many commands wait."""
+
+    def start(self) -> None:
+        """Wait for programs, and serve them; also after ``pause``."""
+
+    def pause(self) -> None:
+        """Close the place and disconnect its programs until the next ``start``."""
+
+    def stop(self) -> None:
+        """End the place."""
+
+
+def guest_place(place: SharePlace, stations: Sequence[int], network: Network, queue: GuestQueue,
+                wake: Callable[[], None], listener: GuestListener,
+                fault: Callable[[Exception], None]) -> GuestPlace:
+    """Return what serves a place, for a map with rows of these ``stations``."""
+    if not place.is_ethernet:
+        return GuestLine(place, network, queue, wake, listener, fault)
+    from abdf1_ros.share.ethernet_place import EthernetPlace
+    return EthernetPlace(
+        place, station_of(place, stations), network, queue, wake, listener, fault)
 
 
 class _Nothing(TaskSource):
@@ -97,6 +136,11 @@ class GuestLine:
         is_shut = state.kind is PortKind.UNAVAILABLE or self.link.has_failed
         return state.text if is_shut else ''
 
+    @property
+    def waiting(self) -> int:
+        """Return how many commands wait."""
+        return len(self.guest.waiting)
+
     def start(self) -> None:
         """Wait for the guest, and serve it; also after ``pause``."""
         if self.link.is_released:
@@ -144,11 +188,14 @@ class GuestLine:
         place = self._place
         if place.kind == 'pty':
             return PtyPlace(place.name)
-        if place.kind == 'tcp':
-            return TcpEndpoint(place.host, place.port,
-                               partial(self.guest.listener.turned_away, self.guest), 0.0,
+        if place.listens:
+            return TcpEndpoint(place.host, place.port, self._turned_away, 0.0,
                                lambda: self.machine.counters.messages_received)
         return SerialEndpoint(self._port)
+
+    def _turned_away(self, other: str) -> None:
+        self.guest.listener.turned_away(
+            self.guest, other, 'the place takes one program at a time')
 
     def _changed(self, state: PortState) -> None:
         self.guest.is_connected = state.is_open

@@ -229,6 +229,19 @@ def test_lines_stand_in_the_order_of_their_numbers(tmp_path: Path, capsys: Outpu
     assert total.endswith(' 0 with errors; not part of a line: line1_map.csv')
 
 
+def test_ethernet_place_needs_a_station_where_the_map_has_several(
+        tmp_path: Path, capsys: Output) -> None:
+    rows = [f'{name},Read,N7:0,{name[1]},SLC,2,1000' for name in ('a1', 'b2')]
+    write_csv(tmp_path / 'net.csv', f'{NET_HEADER},Share', [f'{GOOD_NET},eip:44818'])
+    write_csv(tmp_path / 'map.csv', MAP_HEADER, rows)
+    assert main([str(tmp_path)]) == 2
+    assert (f'error: {tmp_path}/net.csv:2:7 (Share): Share: "eip:44818": which station answers '
+            'there? the map has rows of 1, 2; write eip:44818?station=1'
+            ) in capsys.readouterr().out
+    write_csv(tmp_path / 'map.csv', MAP_HEADER, rows[:1])
+    assert main([str(tmp_path)]) == 0
+
+
 def test_two_lines_of_a_folder_on_one_port_are_an_error(tmp_path: Path, capsys: Output) -> None:
     for name, port in (('dryer', '1'), ('glue', '/dev/ttyUSB0'), ('oven', '/dev/ttyS0'),
                        ('paint', 'socket://localhost:4001,tcp:7'),

@@ -252,7 +252,16 @@ def test_guests_are_part_of_the_load() -> None:
     assert text == (
         'while guests (Share) ask, a quarter of the time may be theirs: the periods then need '
         f'{report.load / 0.75:.0%} of the time that is left, and the poll cycle is up to a third '
-        'longer')
+        'longer; of their reads of 20 words the line takes 11 a second, and 3 beside rows with '
+        'Period 0')
+
+
+@for_all(('baud', 'mode', 'told'), [
+    (9600, 'Peer', '11 a second, and 3 '), (19200, 'Peer', '21 a second, and 5 ')])
+def test_commands_of_guests_a_second_are_told_for_the_line(
+        baud: int, mode: str, told: str) -> None:
+    report = report_of(make_mapping('N7:0', period=1000), share='eip:44818', baud=baud, mode=mode)
+    assert f'the line takes {told}beside rows' in texts(report, RemarkKind.LOAD)[0]
 
 
 def test_served_words_and_broadcasts_clash_with_nothing() -> None:

@@ -124,6 +124,15 @@ def test_cells_keep_what_a_shell_would_expand(make_node: Nodes, files: Files) ->
     assert 'Com_Port = "~/plc" should be a number from 1, a device path' in told
 
 
+def test_ethernet_place_has_to_name_a_station_of_the_map(make_node: Nodes, files: Files) -> None:
+    write_csv(Path(files['net_file']), 'Station,Share', ['5,eip:44818?station=7'])
+    told, = problems_of(make_node(files))
+    assert told.startswith(
+        f'{files["net_file"]}:2:2 (Share): Share: "eip:44818?station=7": no row')
+    told, = problems_of(make_node({**files, 'net.share': 'eip:44818?station=8'}))
+    assert told.startswith('parameter net.share: Share: "eip:44818?station=8": no row has station')
+
+
 def test_one_line_tells_what_the_node_runs_with(configured: Configured, files: Files) -> None:
     rows = [*MAP, 'b,Write,N7:20,2,SLC,4,,,recipe']
     write_csv(Path(files['map_file']), f'{MAP_HEADER},Topic', rows)

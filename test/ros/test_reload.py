@@ -29,6 +29,7 @@ from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.ros.bridge.guests import GuestPlaces
+from abdf1_ros.ros.bridge.port_owners import held_line
 from abdf1_ros.ros.bridge.reload import changes, refuse_harm, rows_left_behind
 from abdf1_ros.ros.bridge.session import BridgeSession
 from abdf1_ros.ros.diagnostics.line import LineView
@@ -555,6 +556,8 @@ def test_map_without_rows_would_end_all_topics() -> None:
 
 def test_line_holds_its_ports_and_the_places_of_its_guests() -> None:
     assert configured(share='pty:/a tcp:5000').held == ('/dev/ttyS0', 'pty:/a', 'tcp:5000')
+    place, = configured(share='eip:5000?station=1').held[1:]
+    assert held_line(place) == held_line('tcp:127.0.0.1:5000')
     assert configured(listen_port='2').held == ('/dev/ttyS0',), 'it has no effect'
     assert heard('/dev/ttyS0', '2').held == ('/dev/ttyS0', '/dev/ttyS1')
 

@@ -17,6 +17,7 @@
 from contextlib import suppress
 from pathlib import Path
 import socket
+import struct
 from unittest.mock import Mock
 
 from abdf1_ros.cli.sniff import main as sniff
@@ -34,6 +35,7 @@ import pytest
 from std_msgs.msg import Float32MultiArray
 from support.device_server import OWN_HOST
 from support.driver_bench import DriverBench
+from support.ethernet_ip import EthernetClient
 from support.mappings import make_mapping
 from support.ros import Observer, OK, Process, until_status, WARN
 from support.simulator_process import make_files, OFTEN
@@ -94,10 +96,47 @@ def test_what_is_not_allowed_and_who_is_turned_away_is_told_once(tmp_path: Path)
         node.wait_for('[WARN] ', f'guest tcp:{place}: command refused: 0F/AA to station 2, '
                       'protected typed logical write F8:4 = 30.5; it needs Share_Access Write, '
                       'and has Read')
-        node.wait_for('[WARN] ', f'guest tcp:{place}: a second program, at 127.0.0.1:',
-                      ', was refused: a place takes one program at a time')
+        node.wait_for('[WARN] ', f'guest tcp:{place}: another program, at 127.0.0.1:',
+                      ', was refused: the place takes one program at a time')
         node.end()
     assert node.text.count('command refused') == 1
+
+
+def test_programs_on_the_network_read_and_write_through_the_node(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    files = make_files(tmp_path)
+    with socket.create_server((OWN_HOST, 0)) as free:
+        port = int(free.getsockname()[1])
+    place = f'eip:{OWN_HOST}:{port}?station=2'
+    with (files.start_simulator(), Observer() as observer,
+          Process('node', *files.args(OFTEN, f'net.share:="{place}"', 'net.share_access:=Write',
+                                      f'trace_file:={tmp_path}/line.cap')) as node):
+        setpoints = observer.listen(Float32MultiArray, '/abdf1/read/setpoint')
+        diagnostics = observer.diagnostics(files.port)
+        setpoints.values([21.5])
+        until_status(diagnostics, 'guests', OK)
+        with EthernetClient(OWN_HOST, port) as one, EthernetClient(
+                OWN_HOST, port, is_connected=True) as two:
+            for client in one, two:
+                assert client.execute(bytes.fromhex('0F 00 0100 A2 04 07 89 0A 00')) \
+                    == bytes.fromhex('4F 00 0100 6500 6600')  # N7:10
+            assert one.execute(bytes.fromhex('0F 00 0200 AA 04 08 8A 04 00') + struct.pack(
+                '<f', 30.5)) == bytes.fromhex('4F 00 0200')
+            setpoints.values([30.5])
+            assert two.execute(bytes.fromhex('07 00 0300')) == bytes.fromhex('47 60 0300')
+            status = until_status(diagnostics, 'guests', WARN,
+                                  lambda status: '1 command not allowed' in status.message)
+        told = {entry.key: entry.value for entry in status.values}[place]
+        assert told.startswith('2 clients: 127.')
+        assert '(vendor 77, serial number 12345678, 2 commands)' in told
+        assert '; 4 commands, 1 not allowed, 0 outside of limits, 0 without reply' in told
+        node.wait_for('[WARN] ', f'guest {place} has sent to station 2: protected typed '
+                      'logical write F8:4 = 30.5, words of setpoint')
+        node.end()
+    assert sniff([str(tmp_path / 'line.cap')]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert sum(f'| guest {place} |' in line and 'write F8:4 = 30.5' in line
+               for line in lines) == 1
 
 
 def told_by(notes: Mock) -> list[str]:

@@ -23,9 +23,16 @@ from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.messages import Severity
 from abdf1_ros.problems import ConfigurationError, Place, Problem
 from abdf1_ros.settings import BAUD_RATES
-from abdf1_ros.settings.network import FIELDS, load_network, make_network, MODE_NAMES, Network
+from abdf1_ros.settings.network import (
+    FIELDS,
+    load_network,
+    make_network,
+    MODE_NAMES,
+    Network,
+    share_problems,
+)
 from abdf1_ros.settings.remarks import network_remarks
-from abdf1_ros.settings.share import share_places, SharePlace
+from abdf1_ros.settings.share import share_places, SharePlace, station_of
 from abdf1_ros.settings.station_lists import parse_stations
 import pytest
 from support.cases import for_all
@@ -247,7 +254,10 @@ def test_radio_modem_and_what_it_sends_on(path: Path) -> None:
     ('tcp:[::1]:4501', SharePlace('tcp:[::1]:4501', 'tcp', '[::1]:4501', '::1', 4501)),
     ('/dev/ttyUSB1?baud=19200&check=CRC&parity=Even', SharePlace(
         '/dev/ttyUSB1?baud=19200&check=CRC&parity=Even', 'serial', '/dev/ttyUSB1', baud=19200,
-        check=Checksum.CRC, parity='Even'))])
+        check=Checksum.CRC, parity='Even')),
+    ('eip:44818', SharePlace('eip:44818', 'eip', '44818', '127.0.0.1', 44818)),
+    ('eip:10.0.0.5:44818?station=0', SharePlace(
+        'eip:10.0.0.5:44818?station=0', 'eip', '10.0.0.5:44818', '10.0.0.5', 44818, station=0))])
 def test_place_is_a_link_a_port_or_a_device(text: str, place: SharePlace) -> None:
     assert share_places(f' {text} ') == [place]
 
@@ -260,6 +270,13 @@ def test_place_is_a_link_a_port_or_a_device(text: str, place: SharePlace) -> Non
     *((text, 'only a serial device has baud') for text in (
         'pty:/tmp/a?baud=9600', 'tcp:99?parity=Odd')),
     ('/dev/ttyS1?speed=9600', 'after "?" may come baud=300|'),
+    ('eip:', '"eip:" should be eip:PORT (for this machine only) or eip:ADDRESS:PORT'),
+    ('eip:plant.example:44818', 'eip:ADDRESS:PORT, with the address of an interface'),
+    *((f'eip:44818?{option}', 'after "?" may come station=N, the PLC that answers there, 0-254')
+      for option in ('baud=9600', 'check=BCC', 'parity=Odd', 'station=255', 'station=',
+                     'station=x', 'station=1&baud=9600')),
+    ('tcp:4501?station=1', 'after "?" may come baud=300|'),
+    ('eip:44818?station=1 eip:44818?station=2', '"eip:44818" is there twice; '),
     ('/dev/ttyS1?check=LRC', 'check=BCC|CRC'), ('tcp:99?check=', 'after "?" may come'),
     ('pty:/tmp/a pty:/tmp/a?check=BCC', 'there twice; '),
     (' '.join(f'tcp:{port}' for port in range(4000, 4017)), 'the most are 16')])
@@ -279,7 +296,8 @@ def test_place_is_one_however_it_is_written(tmp_path: Path) -> None:
                        (f'pty:{tmp_path}/a', f'pty:{tmp_path}/same/a'),
                        (f'{tmp_path}/tty', f'{tmp_path}/link?baud=9600'),
                        ('tcp:4501', 'tcp:127.0.0.1:4501'), ('tcp:4501', 'tcp:0.0.0.0:4501'),
-                       ('tcp:4501', 'tcp:[::1]:4501')]:
+                       ('tcp:4501', 'tcp:[::1]:4501'), ('tcp:4501', 'eip:4501?station=1'),
+                       ('eip:4501', 'eip:[::1]:4501?station=2')]:
         with pytest.raises(ValueError, match='there twice, also as'):
             share_places(f'{one} tcp:99 {other}')
     assert len(share_places('tcp:4501 tcp:4502 tcp:10.0.0.1:4501')) == 3
@@ -289,7 +307,8 @@ def test_place_is_one_however_it_is_written(tmp_path: Path) -> None:
 @pytest.mark.parametrize(('port', 'place'), [
     ('{0}/tty', '{0}/link?baud=9600'), ('{0}/link', '{0}/tty'), ('{0}/new', 'pty:{0}//new'),
     ('{0}/link', 'pty:{0}/link'),
-    ('socket://127.0.0.1:4501', 'tcp:4501'), ('1', '/dev/ttyS0')])
+    ('socket://127.0.0.1:4501', 'tcp:4501'), ('socket://127.0.0.1:4501', 'eip:4501'),
+    ('1', '/dev/ttyS0')])
 def test_port_of_the_line_is_no_place(port: str, place: str, tmp_path: Path) -> None:
     (tmp_path / 'tty').touch()
     (tmp_path / 'link').symlink_to('tty')
@@ -315,8 +334,30 @@ def test_parameter_has_to_go_with_the_rest_of_the_file(
         make_network({name: (text, 'x')}, base)
 
 
+@for_all(('text', 'stations', 'found'), [
+    ('eip:44818', (3,), 3), ('eip:44818?station=3', (3,), 3), ('eip:44818?station=2', (1, 2), 2),
+    ('eip:44818?station=9', (), 9),
+    ('eip:44818', (1, 2), 'which station answers there? the map has rows of 1, 2; write '
+     'eip:44818?station=1'),
+    ('eip:44818', (), 'which station answers there? the map has no rows; write '
+     'eip:44818?station=1'),
+    ('eip:44818?station=3', (1, 2), 'no row has station 3; the map has rows of 1, 2'),
+    ('eip:44818?station=99', tuple(range(20)), 'has rows of 0, 1, 2, 3, 4, 5, 6, 7, ...')])
+def test_ethernet_place_answers_for_one_station_of_the_map(
+        text: str, stations: tuple[int, ...], found: int | str) -> None:
+    network = Network(share=f'pty:/tmp/a {text}', share_at='net.csv:2')
+    place = share_places(text)[0]
+    if isinstance(found, int):
+        assert station_of(place, stations) == found
+        assert [*share_problems(network, stations)] == []
+    else:
+        problem, = share_problems(network, stations)
+        assert str(problem).startswith(f'net.csv:2: Share: "{text}": ')
+        assert found in str(problem)
+
+
 def test_place_that_is_open_to_other_machines_is_told() -> None:
-    places = 'tcp:0.0.0.0:4501', 'tcp:10.0.0.1:9?check=BCC'
+    places = 'tcp:0.0.0.0:4501', 'eip:10.0.0.1:9?station=1'
     remarks = network_remarks(Network(
         share=f'{places[0]} pty:/tmp/a tcp:127.0.0.2:1 {places[1]}'))
     assert [*remarks] == [

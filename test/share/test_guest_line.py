@@ -45,7 +45,7 @@ from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.share import share_places
-from abdf1_ros.share.guest_line import GuestLine
+from abdf1_ros.share.guest_line import guest_place, GuestLine
 import pytest
 from support.cases import for_all
 from support.device_server import OWN_HOST
@@ -78,8 +78,8 @@ class Shared:
         name = self._line.name
         self.near = LinkThread(self.driver.machine, lambda: open_port(PortSettings(name)))
         self.faults: list[Exception] = []
-        self.guests = [GuestLine(place, network, self.driver.guests, self.near.wake,
-                                 GuestListener(), self.faults.append)
+        self.guests = [guest_place(place, (1,), network, self.driver.guests, self.near.wake,
+                                   GuestListener(), self.faults.append)
                        for place in share_places(places)]
 
     def start(self) -> None:

@@ -29,7 +29,7 @@ from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.ros.diagnostics.log import LimitedLog
 from abdf1_ros.ros.parameters.declared import Configuration
 from abdf1_ros.settings.share import share_places
-from abdf1_ros.share.guest_line import GuestLine
+from abdf1_ros.share.guest_line import guest_place
 from abdf1_ros.text import first
 
 
@@ -45,7 +45,8 @@ class GuestPlaces(GuestListener):
         network = configuration.network
         if configuration.parameters.read_only:
             network = replace(network, share_access='Read')
-        self.lines = [GuestLine(place, network, driver.guests, wake, self, self._fault)
+        self.lines = [guest_place(place, configuration.mappings.stations, network, driver.guests,
+                                  wake, self, self._fault)
                       for place in share_places(network.share)]
 
     def start(self) -> None:
@@ -71,11 +72,10 @@ class GuestPlaces(GuestListener):
         """Write the name of the guest into the trace: its command is sent now."""
         self._opener.note_guest(guest.name, command)
 
-    def turned_away(self, guest: Guest, other: str) -> None:
-        """Log that a second program tried to use a place."""
+    def turned_away(self, guest: Guest, other: str, why: str) -> None:
+        """Log that one more program tried to use a place."""
         self._notes.warning(f'guest {guest.name}', (
-            f'guest {guest.name}: a second program, at {other}, was refused: a place takes '
-            'one program at a time'))
+            f'guest {guest.name}: another program, at {other}, was refused: {why}'))
 
     def wrote(self, guest: Guest, command: Packet, flight: Flight) -> None:
         """Log that a guest has sent a write to words that this bridge writes too."""

@@ -51,7 +51,7 @@ class PortOwners:
 
 
 def _is_place(name: str) -> bool:
-    return name.startswith(('pty:', 'tcp:'))
+    return name.startswith(('pty:', 'tcp:', 'eip:'))
 
 
 def held_line(name: str) -> str:

@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from abdf1_ros.ros.diagnostics.status import ERROR, Judgement, OK, WARN
-from abdf1_ros.share.guest_line import GuestLine
+from abdf1_ros.share.guest_line import GuestPlace
 from abdf1_ros.text import counted, milliseconds
 
 
@@ -28,7 +28,7 @@ class GuestsStatus:
 
     name = 'guests'
 
-    def __init__(self, lines: Sequence[GuestLine], port: str) -> None:
+    def __init__(self, lines: Sequence[GuestPlace], port: str) -> None:
         self.hardware_id = port
         self._lines = lines
 
@@ -51,5 +51,5 @@ class GuestsStatus:
             f'{line.state}; {counted(line.guest.commands, "command")}, '
             f'{line.guest.refused} not allowed, {line.guest.outside} outside of limits, '
             f'{line.guest.unanswered} without reply, '
-            f'{len(line.guest.waiting)} waiting, '
+            f'{line.waiting} waiting, '
             f'slowest {milliseconds(line.guest.slowest or None)}') for line in self._lines}

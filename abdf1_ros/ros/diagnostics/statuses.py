@@ -30,7 +30,7 @@ from abdf1_ros.ros.diagnostics.standby import StandbyStatus
 from abdf1_ros.ros.diagnostics.stations import StationStatus
 from abdf1_ros.ros.diagnostics.status import message_of, Status, WORDS
 from abdf1_ros.ros.diagnostics.topics import TopicsStatus
-from abdf1_ros.share.guest_line import GuestLine
+from abdf1_ros.share.guest_line import GuestPlace
 from diagnostic_msgs.msg import DiagnosticStatus
 
 
@@ -47,7 +47,7 @@ class Diagnostics:
 
     def __init__(self, node_name: str, driver: Driver, port: str,
                  events: LineEvents, left_out: Sequence[Problem] = (),
-                 guests: Sequence[GuestLine] = (), alarms: Sequence[Status] = ()) -> None:
+                 guests: Sequence[GuestPlace] = (), alarms: Sequence[Status] = ()) -> None:
         self._node_name = node_name
         seen = events.seen
         self.line = LineView(driver)

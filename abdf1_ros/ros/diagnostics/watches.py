@@ -24,7 +24,7 @@ from abdf1_ros.ros.diagnostics.line import deaf_text, LineView
 from abdf1_ros.ros.diagnostics.link import changed_text
 from abdf1_ros.ros.diagnostics.log import ERROR, INFO, News, WARN
 from abdf1_ros.ros.diagnostics.status import Seen
-from abdf1_ros.share.guest_line import GuestLine
+from abdf1_ros.share.guest_line import GuestPlace
 from rclpy.impl.logging_severity import LoggingSeverity
 
 
@@ -79,7 +79,7 @@ class DeafStations:
         return news
 
 
-def watches_of(line: LineView, port: str, seen: Seen, guests: Sequence[GuestLine],
+def watches_of(line: LineView, port: str, seen: Seen, guests: Sequence[GuestPlace],
                changed_files: Callable[[float], Sequence[str]],
                crowded_topics: Callable[[float], Sequence[str]],
                refused_topics: Callable[[float], Mapping[str, str]],

@@ -40,7 +40,14 @@ from abdf1_ros.ros.parameters.values import usable
 from abdf1_ros.settings.columns import COLUMNS, MAX_PERIOD
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Mapping
-from abdf1_ros.settings.network import FIELDS, load_network, make_network, Network, URLS
+from abdf1_ros.settings.network import (
+    FIELDS,
+    load_network,
+    make_network,
+    Network,
+    share_problems,
+    URLS,
+)
 from abdf1_ros.settings.rows import Rows
 from abdf1_ros.settings.station_lists import octal_of, parse_stations
 from abdf1_ros.text import counted, printable
@@ -260,6 +267,7 @@ def _from_files(given: Given, parameters: Parameters, problems: list[Problem], *
         if found is not None:  # the rows cannot be judged by a line that is not known
             mappings, unusable = usable_rows(mappings, found, parameters.default_period / 1000)
             map_problems += unusable
+            problems += share_problems(found, mappings.stations)
     except ConfigurationError as error:
         problems += error.problems
     if is_strict:
