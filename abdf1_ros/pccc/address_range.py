@@ -124,7 +124,7 @@ def read_range(text: str, parse: Callable[[str], Address]) -> Address | AddressR
     """
     plain = text.strip().upper()
     if match := _COUNT.fullmatch(plain):
-        counted = _of_count(parse(match['first']), '.' in match['first'], int(
+        counted = _of_count(parse(match['first']), names_word(match['first']), int(
             match['braces'] or match['brackets'] or match['comma']))
         raise AddressSyntaxError(f'write {counted.first}, and Length {counted.length()}')
     match = _RANGE.fullmatch(plain)
@@ -143,7 +143,7 @@ def read_range(text: str, parse: Callable[[str], Address]) -> Address | AddressR
     return found
 
 
-def _of_count(first: Address, names_word: bool, count: int) -> AddressRange:
+def _of_count(first: Address, is_word: bool, count: int) -> AddressRange:
     """Return the range of ``count`` elements or bits from ``first``, as other programs count."""
     if count < 1:
         raise AddressSyntaxError('a range has at least one element')
@@ -156,13 +156,18 @@ def _of_count(first: Address, names_word: bool, count: int) -> AddressRange:
         last = replace(first, element=first.element + count - 1)
     if last.offset >= first.area_size:
         raise AddressRangeError(f'the last word there can be is {first.last_of_area}')
-    is_whole = first.file_type.is_structure and not first.word and not names_word
+    is_whole = first.file_type.is_structure and not first.word and not is_word
     return AddressRange(first, last, is_whole, is_short=True)
 
 
 def is_element(address: Address, text: str) -> bool:
     """Tell whether a text names an element of a structure without a word of it."""
-    return address.file_type.is_structure and address.bit is None and '.' not in text
+    return address.file_type.is_structure and address.bit is None and not names_word(text)
+
+
+def names_word(text: str) -> bool:
+    """Tell whether the address of a structure names a word or bit of it, as in T4:0/ACC."""
+    return re.search('[./]', text) is not None
 
 
 def _position(address: Address) -> int:

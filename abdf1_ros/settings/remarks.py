@@ -18,11 +18,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 import math
-import re
 
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.machine import MIN_RESPONSE_TIME
 from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.address_range import names_word
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.plc5.address import USUAL_LAST_ELEMENT
 from abdf1_ros.pccc.processor import Processor, USUAL
@@ -170,7 +170,7 @@ def _useless_cells(row: Row, mapping: Mapping) -> Iterator[Problem]:
         yield _at(row, 'Period', f'Period {period} is in ms; {period} s would be {period * 1000}')
     address = mapping.address
     if address.file_type.is_structure and mapping.length == 1 and address.bit is None \
-            and not re.search('[./]', row.get('Address')):
+            and not names_word(row.get('Address')):
         yield _at(row, 'Address', f'{row.get("Address")} is the control word of the element; its '
                                   f'values are {", ".join(value_addresses(address))}')
     if control := _beyond_control(mapping):

@@ -30,7 +30,7 @@ from abdf1_ros.cli.plc.session import complain, Session
 from abdf1_ros.cli.terminal import EXIT_FAILED, EXIT_UNKNOWN
 from abdf1_ros.driver.write import Outcome, show, Write, WriteResult
 from abdf1_ros.driver.writes.packets import carry_out
-from abdf1_ros.errors import Abdf1Error, FormatError, PortLost
+from abdf1_ros.errors import Abdf1Error, FormatError, PortLost, RemoteError
 from abdf1_ros.numbers import decimal_number, two_readings, whole_number
 from abdf1_ros.open_line import Pending
 from abdf1_ros.pccc import steps
@@ -39,6 +39,7 @@ from abdf1_ros.pccc.address_range import AddressRange, is_element
 from abdf1_ros.pccc.families import FAMILIES, parse_range
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.processor import Processor, USUAL
+from abdf1_ros.pccc.status import STS_ILLEGAL_COMMAND
 from abdf1_ros.pccc.strings import is_string_element
 from abdf1_ros.pccc.structures import named_runs
 from abdf1_ros.pccc.values import Values, ValueType
@@ -219,7 +220,17 @@ def status_of(result: WriteResult) -> int:
     if result.outcome is Outcome.WRITTEN:
         return 0
     complain(f'{named(result.mapping)} of station {result.mapping.station}: {result}')
+    if _may_lack_bit_writes(result):
+        complain('SLC 5/01, 5/02 and MicroLogix 1000 may not know the command that writes bits: '
+                 'name the processor with --processor, or in the column Processor of the map')
     return EXIT_UNKNOWN if result.outcome in _UNCERTAIN else EXIT_FAILED
+
+
+def _may_lack_bit_writes(result: WriteResult) -> bool:
+    """Tell whether a processor that is not named may have refused the masked write."""
+    row, error = result.mapping, result.error
+    return isinstance(error, RemoteError) and error.sts == STS_ILLEGAL_COMMAND \
+        and row.address.bit is not None and row.plc_type is PlcType.SLC and row.processor is None
 
 
 class Writing:

@@ -22,7 +22,7 @@ from typing import cast
 from abdf1_ros.cli.plc import data
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.driver.write import Outcome, WriteResult
-from abdf1_ros.errors import FormatError, PortLost
+from abdf1_ros.errors import FormatError, PortLost, RemoteError
 from abdf1_ros.open_line import Pending
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.problems import ConfigurationError
@@ -226,3 +226,22 @@ def test_address_of_rack_and_group_is_refused_in_the_words_of_a_plc5(
     with pytest.raises(ConfigurationError) as caught:
         data.check_for_some_family([address], {'Command': 'Read', 'Station': '1'})
     assert said in str(caught.value)
+
+
+@for_all(('address', 'places'), [
+    ('T4:0/ACC', ['T4:0.ACC']), ('C5:1/PRE', ['C5:1.PRE']), ('R6:0/LEN', ['R6:0.LEN']),
+    ('T4:0', ['T4:0', 'T4:0.PRE', 'T4:0.ACC']), ('T4:1/DN', ['T4:1/DN'])])
+def test_only_an_element_without_a_word_stands_for_all_its_words(
+        address: str, places: list[str]) -> None:
+    found = data.mappings_of(address, {'Command': 'Read', 'Station': '1', 'PLC_Type': 'SLC'})
+    assert [str(mapping.place_of(number)) for mapping in found
+            for number in range(mapping.length)] == places
+
+
+def test_refused_bit_write_leads_to_the_column_processor(
+        capsys: pytest.CaptureFixture[str]) -> None:
+    for processor, sts, is_told in (('', 0x10, True), ('5/03', 0x10, False), ('', 0x50, False)):
+        row = make('B3:1/3', **({'Processor': processor} if processor else {}))
+        data.status_of(WriteResult(row, Outcome.REFUSED, 'refused', '1',
+                                   error=RemoteError(sts, None, '')))
+        assert ('name the processor' in capsys.readouterr().err) == is_told, (processor, sts)
