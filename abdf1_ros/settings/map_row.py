@@ -288,7 +288,8 @@ class RowReader:
         if fault := wrong_type(mapping.address, mapping.type):
             self._fault('Type', fault)
         if mapping.address.file_type is FileType.STRING and mapping.length != 1:
-            self._fault('Length', 'a string mapping has Length 1')
+            self._fault('Length', (
+                'a string mapping has Length 1: give each string its own address'))
 
     def _check_values(self, mapping: Mapping) -> None:
         """Check the conversion of raw values to values of the topic."""

@@ -240,7 +240,8 @@ def test_command_says_whether_a_row_reads_and_writes(text: str, reads: bool, wri
     *(({'Address': 'ST9:0', column: '4'},
        f'{number} ({column}): Item: 1, a string has no {column}; leave the cell empty')
       for number, column in ((11, 'Min'), (12, 'Max'))),
-    ({'Address': 'ST9:0', 'Length': '2'}, '6 (Length): Item: 1, a string mapping has Length 1'),
+    ({'Address': 'ST9:0', 'Length': '2'},
+     '6 (Length): Item: 1, a string mapping has Length 1: give each string its own address'),
     *(({'Min': '5', 'Max': '4'} | scale, '11 (Min): Item: 1, Min is greater than Max')
       for scale in ({}, {'Scale': '0.1'})),
     ({'Address': 'T4:0/13', 'Length': '4', 'Command': 'Read'},

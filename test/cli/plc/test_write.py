@@ -186,7 +186,7 @@ def test_write_that_does_not_fit_the_family_of_the_plc(plc: Plc) -> None:
     (('read', 'N7:0', '--length', 'x'), '--length: "x" should be a whole number from 1 to 65535'),
     (('watch', 'N7:0', '--length', '0'), '--length: "0" should be a whole number from 1 to 65535'),
     (('read', 'N7:0', 'ST9:0', '--length', '3'),
-     '--length of ST9:0: a string mapping has Length 1'),
+     '--length of ST9:0: a string mapping has Length 1: give each string its own address'),
     (('watch', 'line_speed'), 'ADDRESS "line_speed": write type, file, ":", element, as in N7:0, '
                               'B3:1/5, T4:0.ACC or I:1.0/3\nplc: --map: if line_speed is a tag, '
                               'give its map with --map FILE'),
