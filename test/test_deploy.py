@@ -140,7 +140,8 @@ def test_unit_starts_again_after_what_may_pass_only(path: Path) -> None:
 def test_unit_may_open_serial_ports_only(path: Path) -> None:
     service = unit(path)['Service']
     assert service['DevicePolicy'] == ['closed']
-    assert set(service['DeviceAllow']) == {'char-ttyS rw', 'char-ttyUSB rw', 'char-ttyACM rw'}
+    assert set(service['DeviceAllow']) == {
+        f'char-{kind} rw' for kind in ('ttyS', 'ttyUSB', 'ttyACM', 'ttyAMA')}
     assert service['SupplementaryGroups'] == ['dialout']
     assert service['User'] != ['root']
     assert service['CapabilityBoundingSet'] == ['']
