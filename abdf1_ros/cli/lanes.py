@@ -38,6 +38,7 @@ _GAP = 6
 _LETTER = 6.3  # pixels of a letter in a bar
 _LEAST = 1.6  # pixels: least width of a bar, so that it can be seen
 TICKS = 10  # about, on an axis
+_BARE = ' style="stroke: none"'  # of a bar that may be thin
 _MARGIN = 4  # pixels above and below a curve
 _MOST_LETTERS = 17  # of a name
 _MARK = '<meta name="generator" content="abdf1_ros">'
@@ -88,6 +89,7 @@ class Bar:
     - ``title``: shown under the mouse.
     - ``labels``: the bar shows the first label that fits.
     - ``link``: the name of a drawing.
+    - ``low``, ``high``: the part of the row's height that it takes.
     """
 
     start: float
@@ -97,6 +99,8 @@ class Bar:
     labels: Sequence[str] = ()
     row: int = 0
     link: str = ''
+    low: float = 0.0
+    high: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,15 +117,21 @@ class Scale:
 
 @dataclass(frozen=True, slots=True)
 class Lane:
-    """Bars in one row or several rows; each bar has the number of its row."""
+    """
+    Bars in one row or several rows; each bar has the number of its row.
+
+    ``most``: what the full height means; ``tall``: a height of rows other than the usual one.
+    """
 
     name: str
     bars: Sequence[Bar]
     rows: int = 1
+    most: str = ''
+    tall: int = 0
 
     @property
     def row_height(self) -> int:
-        return 22 if self.rows == 1 else 14
+        return self.tall or (22 if self.rows == 1 else 14)
 
     @property
     def height(self) -> int:
@@ -129,7 +139,8 @@ class Lane:
 
     def ground(self, top: int) -> str:
         """Return what is below the grid."""
-        return _label(self.name, top + self.height / 2 + 4) + _ground(top, self.height)
+        return _label(self.name, top + self.height / 2 + 4) + _ground(top, self.height) \
+            + _limit(self.most, top + 10)
 
     def drawn(self, top: int, scale: Scale) -> Iterator[str]:
         """Yield what is above the grid."""
@@ -160,11 +171,9 @@ class CurveLane:
     def ground(self, top: int) -> str:
         """Return what is below the grid."""
         low, high = self.texts
-        limits = ((low if low != high else '', top + self.height - 3), (high, top + 10))
-        return ''.join([
-            _label(self.name, top + self.height / 2 + 4, self.title), _ground(top, self.height),
-            *(f'<text x="{NAMES - 4}" y="{y}" text-anchor="end">{text_of(text)}</text>'
-              for text, y in limits)])
+        return _label(self.name, top + self.height / 2 + 4, self.title) \
+            + _ground(top, self.height) + _limit(high, top + 10) \
+            + _limit(low if low != high else '', top + self.height - 3)
 
     def drawn(self, top: int, scale: Scale) -> Iterator[str]:
         """Yield what is above the grid."""
@@ -228,10 +237,16 @@ def _label(name: str, y: float, title: str = '') -> str:
     return f'<text x="0" y="{y:.1f}">{text_of(known)}{told}</text>'
 
 
+def _limit(text: str, y: float) -> str:
+    return text and f'<text x="{NAMES - 4}" y="{y}" text-anchor="end">{text_of(text)}</text>'
+
+
 def _bar(bar: Bar, top: int, height: int, scale: Scale) -> Iterator[str]:
     left, width = scale.place(bar.start), (bar.end - bar.start) * scale.pixels
-    drawn = (f'<rect class="{bar.look.value}" x="{left:.1f}" y="{top + 1}" '
-             f'width="{max(width, _LEAST):.1f}" height="{height - 2}">'
+    room = height - 2
+    y, tall = top + 1 + room * (1 - bar.high), room * (bar.high - bar.low)
+    drawn = (f'<rect class="{bar.look.value}" x="{left:.1f}" y="{y:.4g}" '
+             f'width="{max(width, _LEAST):.1f}" height="{tall:.4g}"{_BARE * (tall < room)}>'
              f'<title>{text_of(bar.title)}</title></rect>')
     yield f'<a href="#{text_of(bar.link)}">{drawn}</a>' if bar.link else drawn
     label = next((text for text in bar.labels if len(text) * _LETTER + 6 < width), '')

@@ -41,7 +41,12 @@ MOST_DRAWN = 20_000  # entries; then up to the same number again, only in strips
 MOST_EPISODES = 200  # shown in the table
 _PAUSE = 5.0  # s; after a longer pause the same fault starts a new episode
 _MOST_LANES = 40
-_BUCKETS = 260  # bars in a lane of the overview
+_BUCKETS = 260  # most moments in the overview
+_FINE = 64  # moments of a strip, at first
+_INSIDE = 1e-9  # the end of a time belongs to the next one
+_STEPS = 0.1, 0.2, 0.5  # of the time; what the full height of a lane may mean
+_TALL = 44  # pixels; a lane of the overview
+_LEAST_SHARE, _LEAST_FAULT = 0.02, 0.1  # of the height of a lane, so that it can be seen
 _CHARACTERS = 2000  # length of a strip of a recording without times
 
 _KEY = ((Look.ASK, 'command'), (Look.ANSWER, 'reply'), (Look.SMALL, 'poll, ACK, EOT'),
@@ -86,13 +91,22 @@ class _Episode:
 
 
 @dataclass(slots=True)
+class _Moment:
+    """The looks of a station in a part of the time: how many, and how long."""
+
+    seen: Counter[Look] = field(default_factory=Counter)
+    spent: defaultdict[Look, float] = field(default_factory=lambda: defaultdict(float))
+
+
+@dataclass(slots=True)
 class _Drawing:
     """
     The drawing of one recording, whose times increase.
 
     - ``length``: length of a strip, in ``unit``.
     - ``ends``: the time until which each row of a lane is in use.
-    - ``seen``: number of looks, by station and strip.
+    - ``ranks``: the worst look of each strip, by station.
+    - ``moments``: what each station does in each part of the time, of equal ``width``.
     - ``strips``: drawings by number; None if not drawn.
     """
 
@@ -102,9 +116,36 @@ class _Drawing:
     begun: datetime | None = None
     ends: defaultdict[tuple[int | None, int], float] = field(
         default_factory=lambda: defaultdict(float))
-    seen: defaultdict[tuple[int | None, int], Counter[Look]] = field(
-        default_factory=lambda: defaultdict(Counter))
+    ranks: dict[tuple[int | None, int], int] = field(default_factory=dict)
+    moments: defaultdict[tuple[int | None, int], _Moment] = field(
+        default_factory=lambda: defaultdict(_Moment))
+    width: float = 0.0
+    least: float = math.inf
+    most: float = -math.inf
     strips: dict[int, str | None] = field(default_factory=dict)
+
+    def note(self, station: int | None, look: Look, begin: float, end: float) -> None:
+        """Record a symbol in the moments in which it was on the line."""
+        key = station, int(max(begin, end - _INSIDE) // self.length)
+        self.ranks[key] = max(self.ranks.get(key, 0), _RANKS.index(look))
+        self.width = self.width or self.length / _FINE
+        self.least, self.most = min(self.least, begin), max(self.most, end)
+        while self.most // self.width - self.least // self.width >= _BUCKETS:
+            self._join()
+        self.moments[station, int(begin // self.width)].seen[look] += 1
+        for number in range(int(begin // self.width), int(end // self.width) + 1):
+            left, right = number * self.width, (number + 1) * self.width
+            self.moments[station, number].spent[look] += max(min(right, end) - max(left, begin), 0)
+
+    def _join(self) -> None:
+        """Make one moment of two."""
+        moments, self.width = self.moments, 2 * self.width
+        self.moments = defaultdict(_Moment)
+        for (station, number), moment in moments.items():
+            joined = self.moments[station, number // 2]
+            joined.seen.update(moment.seen)
+            for look, seconds in moment.spent.items():
+                joined.spent[look] += seconds
 
     def clock(self, place: float) -> str:
         """Return the time of day; empty if unknown."""
@@ -114,6 +155,11 @@ class _Drawing:
             return (self.begun + timedelta(seconds=place)).strftime('%H:%M:%S')
         except OverflowError:  # beyond the years that a date can have
             return ''
+
+    @property
+    def of(self) -> str:
+        """Return what a share is a share of."""
+        return 'time' if self.unit == 's' else 'bytes'
 
     def name(self, strip: int) -> str:
         """Return the target of links to a strip."""
@@ -185,7 +231,7 @@ class Timeline:
         if entry.time is not None:
             title = f'{entry.time:.6f} {title}'
         strip.bars[station].append(Bar(max(begin, start), end, look, title, row=row))
-        recording.seen[station, strip.number][look] += 1
+        recording.note(station, look, max(begin, end - recording.length), end)
         if look in _FAULTS:
             self._note_fault(entry, recording, strip.number, begin)
 
@@ -241,7 +287,7 @@ class Timeline:
         verdict = f'{counted(self._count, "fault")} on the line' if self._count else 'no fault'
         yield f'<p class="verdict {"is-bad" if self._count else "is-good"}">{verdict}</p>'
         for recording in self._recordings:
-            if recording.seen:
+            if recording.moments:
                 yield from _overview(recording)
         if self._episodes:
             yield '<h2>Faults</h2>'
@@ -258,40 +304,62 @@ class Timeline:
 
 
 def _overview(recording: _Drawing) -> Iterator[str]:
-    """Yield the whole recording as one drawing, with the worst look of each moment."""
-    numbers = [number for _, number in recording.seen]
-    least, most = min(numbers), max(numbers) + 1
-    step = math.ceil((most - least) / _BUCKETS)
-    seen: defaultdict[int | None, defaultdict[int, list[int]]] = defaultdict(
-        lambda: defaultdict(list))
-    for station, number in recording.seen:
-        seen[station][(number - least) // step].append(number)
-    stations = _in_order(seen)
-    lanes = [Lane(_name(station), [_moment_of(recording, station, found)
-                                   for found in seen[station].values()])
-             for station in stations[:_MOST_LANES]]
+    """Yield the whole recording as one drawing: the share of each station in the time."""
+    stations = _in_order({station for station, _ in recording.moments})
+    numbers = [number for _, number in recording.moments]
+    full = _full(recording)
+    lanes = [Lane(_name(station), [
+        bar for (other, number), moment in recording.moments.items() if other == station
+        for bar in _bars(recording, station, number, moment, full)],
+        most=f'{full:.0%}' if full else '', tall=_TALL)
+        for station in stations[:_MOST_LANES]]
     yield f'<h2>{f"Recording {recording.number}" if recording.number > 1 else "All of it"}</h2>'
     yield key(_KEY)
-    start, end = (number * recording.length for number in (least, most))
+    told = f'The height of a lane is {full:.0%} of the {recording.of}. Faults are drawn higher, ' \
+        'so that they are seen.' if full else \
+        'The speed is not known: --baud shows how much of the time the messages take.'
+    yield f'<p class="quiet">{told}</p>'
+    start, end = min(numbers) * recording.width, (max(numbers) + 1) * recording.width
     yield drawing(lanes, start, end, recording.clock(start) or recording.unit)
     if (more := len(stations) - _MOST_LANES) > 0:
         yield f'<p>and {counted(more, "station")} more</p>'
 
 
-def _moment_of(recording: _Drawing, station: int | None, numbers: list[int]) -> Bar:
-    """Return a bar for some strips of a station, with a link to the worst strip."""
-    looks = {number: recording.seen[station, number] for number in numbers}
+def _full(recording: _Drawing) -> float:
+    """Return the share that the full height of a lane means; 0 if the speed is not known."""
+    most = max(sum(moment.spent.values()) for moment in recording.moments.values())
+    return next((step for step in _STEPS if most <= step * recording.width), 1.0) if most else 0.0
 
-    def rank(number: int) -> int:
-        return max(map(_RANKS.index, looks[number]))
-    worst = max(numbers, key=rank)
-    counts = sum(looks.values(), Counter())
-    faults = sum(counts[look] for look in _FAULTS)
-    start, end = min(numbers) * recording.length, (max(numbers) + 1) * recording.length
-    title = (f'{_name(station)}, {start:g} to {end:g} {recording.unit} '
-             f'{recording.clock(start)}: {counts.total()} seen, {counted(faults, "fault")}')
+
+def _bars(recording: _Drawing, station: int | None, number: int, moment: _Moment,
+          full: float) -> Iterator[Bar]:
+    """
+    Yield the shares of a moment of a station, with a link to its worst strip.
+
+    ``full`` is the share of the full height, 0 if shares are not known.
+    """
+    start, end = number * recording.width, (number + 1) * recording.width
+    strips = [strip for strip in range(int(start // recording.length),
+                                       int((end - _INSIDE) // recording.length) + 1)
+              if (station, strip) in recording.ranks]
+    worst = max(strips, key=lambda strip: recording.ranks[station, strip], default=0)
     link = recording.name(worst) if recording.strips.get(worst) else ''
-    return Bar(start, end, _RANKS[rank(worst)], title, link=link)
+    looks = [look for look in _RANKS if moment.seen[look] or moment.spent[look]]
+    faults = sum(moment.seen[look] for look in _FAULTS)
+    share = f', {min(sum(moment.spent.values()) / recording.width, 1):.0%} of the ' \
+        f'{recording.of}' if full else ''
+    title = (f'{_name(station)}, {start:.6g} to {end:.6g} {recording.unit} '
+             f'{recording.clock(start)}: {moment.seen.total()} seen, '
+             f'{counted(faults, "fault")}{share}')
+    if not full:
+        yield Bar(start, end, looks[-1], title, link=link)
+        return
+    low = 0.0
+    for look in looks:
+        least = _LEAST_FAULT if look in _FAULTS else _LEAST_SHARE
+        high = min(low + max(moment.spent[look] / recording.width / full, least), 1.0)
+        yield Bar(start, end, look, title, link=link, low=min(low, high - least), high=high)
+        low = high
 
 
 def _strips(recording: _Drawing) -> Iterator[str]:

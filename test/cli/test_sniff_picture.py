@@ -62,12 +62,17 @@ def drawn(tmp_path: Path, capsys: Output, *args: str) -> browser.Elements:
     return browser.Elements(page.read_text(encoding='utf-8'))
 
 
+def messages(tmp_path: Path) -> browser.Elements:
+    """Return the part of the page below the overview."""
+    page = (tmp_path / 'line.html').read_text(encoding='utf-8')
+    return browser.Elements(page.partition('<h2>Every message</h2>')[2])
+
+
 def test_each_message_is_a_bar_in_the_lane_of_its_station(tmp_path: Path, capsys: Output) -> None:
     found = drawn(tmp_path, capsys, capture(
         tmp_path / 'line.cap', exchange(0.1, 1), exchange(0.14, 2, station=7)))
-    assert found.bars('ask') == 2
-    assert found.bars('answer') == 2 + 2  # the overview has one for each station
-    assert found.bars('small') == 2 * 3
+    of_messages = messages(tmp_path)
+    assert [of_messages.bars(look) for look in ('ask', 'answer', 'small')] == [2, 2, 2 * 3]
     assert {'station 2', 'station 7', 'no fault'} <= {*found.texts}
     assert 'Recording 2' not in found.texts  # two chunks have one time
     assert '0.100000 command: 5 to 2, TNS 0001: protected typed logical read N7:0, 2 words ' \
@@ -110,30 +115,61 @@ def test_table_of_episodes_tells_that_there_are_more(
     assert ('and more' in told) is is_more
 
 
-def test_overview_has_the_worst_of_each_moment_and_a_link_to_it(
+def overview(found: browser.Elements) -> list[tuple[str, float, float, float, float]]:
+    """Return class, left, width, top and height of the bars of the first picture."""
+    drawings = [at for at, (tag, each) in enumerate(found.found)
+                if tag == 'svg' and 'role' in each]
+    return [(each['class'], *(float(each[name]) for name in ('x', 'width', 'y', 'height')))
+            for _, each in found.found[drawings[0]:drawings[1]]
+            if each.get('class', 'lane') != 'lane' and 'y' in each]
+
+
+def test_overview_shows_the_share_of_the_time(tmp_path: Path, capsys: Output) -> None:
+    # A frame of 20 bytes takes 10.4 ms. Ten minutes with one read each 100 ms are a load of 23 %.
+    found = drawn(tmp_path, capsys, capture(
+        tmp_path / 'line.cap', *(exchange(0.1 * n, n) for n in range(6000)), silence(600.2)))
+    said = [text for text in found.texts if ' seen, ' in text]
+    shares = [int(text.rpartition(', ')[2].partition('%')[0]) for text in said[:-9]]
+    assert {*shares} <= {23, 24} and said[3].startswith('station 2, 4 to 8 s 14:05:13: ')
+    bars = overview(found)
+    assert len(bars) < 3 * 160
+    assert 'The height of a lane is 50% of the time. Faults are drawn higher, so that they are ' \
+        'seen.' in found.texts
+    heights = {look: [tall for other, *_, tall in bars if other == look][5]
+               for look in ('small', 'ask', 'answer')}
+    assert sum(heights.values()) == pytest.approx(0.23 / 0.5 * 42, rel=0.05)
+    # Two messages in half a second: the rest of the time is empty.
+    bars = overview(drawn(tmp_path, capsys, capture(
+        tmp_path / 'line.cap', exchange(0.1, 1), exchange(0.5, 2))))
+    assert sum(width * tall for *_, width, _, tall in bars) < 0.3 * 1030 * 42
+    assert not [left for _, left, *_ in bars if 300 < left < 800]
+
+
+def test_overview_has_faults_higher_than_their_share_and_links_to_them(
         tmp_path: Path, capsys: Output) -> None:
     found = drawn(tmp_path, capsys, capture(
         tmp_path / 'line.cap', exchange(3610.1, 1, station=7), exchange(3615.1, 2, sts=0x10),
         exchange(3617.2, 3, station=7), exchange(3625.1, 4, station=7), silence(3625.9),
         exchange(5700.5, 5)), '--baud', '4800')
-    # A strip has 4 s at this speed, and a bar three of 524 strips.
-    assert [text for text in found.texts if ' seen, ' in text] == [
-        'station 2, 3612 to 3616 s 15:05:21: 5 seen, 1 fault',
-        'station 2, 5700 to 5704 s 15:40:09: 5 seen, 0 faults',
-        'station 3, 3624 to 3628 s 15:05:33: 1 seen, 0 faults',
-        'station 3, 5700 to 5704 s 15:40:09: 1 seen, 1 fault',
-        'station 7, 3608 to 3620 s 15:05:17: 10 seen, 0 faults',
-        'station 7, 3624 to 3628 s 15:05:33: 5 seen, 0 faults']
-    assert found.texts[found.texts.index('station 2'):][:6:2] == [
-        'station 2', 'station 3', 'station 7']
-    links = [each['href'] for tag, each in found.found if tag == 'a'][:5]
-    assert links == ['#r1s903', '#r1s1425', '#r1s906', '#r1s1425', '#r1s902']
-    assert [(each['class'], each['x'], each['y'], each['width']) for _, each in found.found
-            if each.get('class', 'lane') != 'lane' and 'y' in each][:5] == [
-        ('bad', '112.0', '1', '2.0'), ('answer', '1138.0', '1', '2.0'),
-        ('small', '117.9', '29', '2.0'), ('missing', '1138.0', '29', '2.0'),
-        ('answer', '110.0', '57', '5.9')]
-    assert found.texts.count('15:05:17') == 2  # of the overview, and of its first strip
+    # A strip has 4 s at this speed, and a moment 16 s.
+    assert {'station 2, 3600 to 3616 s 15:05:09: 5 seen, 1 fault, 1% of the time',
+            'station 7, 3616 to 3632 s 15:05:25: 10 seen, 0 faults, 1% of the time'} <= {
+        *found.texts}
+    links = {each['href'] for tag, each in found.found if tag == 'a'}
+    assert {'#r1s903', '#r1s1425', '#r1s902'} <= links
+    fault, = [bar for bar in overview(found) if bar[0] == 'bad']
+    assert fault[4] >= 0.1 * 42
+    assert '15:05:09' in found.texts
+
+
+def test_overview_of_an_unknown_speed_shows_when_not_how_much(
+        tmp_path: Path, capsys: Output) -> None:
+    path = capture(tmp_path / 'line.cap', exchange(0.1, 1), exchange(0.5, 2))
+    Path(path).write_text(Path(path).read_text('ascii').replace('# baud: 19200\n', ''), 'ascii')
+    found = drawn(tmp_path, capsys, path)
+    assert 'The speed is not known: --baud shows how much of the time the messages take.' in \
+        found.texts
+    assert {tall for *_, tall in overview(found)} == {42}
 
 
 def test_no_answer_is_drawn_as_long_as_it_was_waited_for(tmp_path: Path, capsys: Output) -> None:
@@ -150,10 +186,10 @@ def test_long_recording_keeps_its_faults(
     parts = [exchange(float(second), second) for second in range(1, 35)]
     found = drawn(tmp_path, capsys, capture(
         tmp_path / 'line.cap', *parts[:29], silence(30.5), *parts[30:]))
-    assert found.bars('ask') == 4 + 1
+    assert messages(tmp_path).bars('ask') == 4 + 1
     assert [text for text in found.texts if 'not drawn' in text] == [
         '26 strips not drawn', '3 strips not drawn']
-    assert found.bars('missing') == 2  # in its strip, and in the overview
+    assert messages(tmp_path).bars('missing') == 1
     assert ('a', {'href': '#r1s20'}) not in found.found  # there is no such strip
     for count, more in ((40, []), (41, ['and 1 station more'])):
         many = capture(tmp_path / 'line.cap', *(silence(0.1, number) for number in range(count)))
@@ -176,19 +212,19 @@ def test_recordings_one_after_the_other_and_without_times(tmp_path: Path, capsys
     mixed = drawn(tmp_path, capsys, first, str(dump), second, str(dump)).texts
     assert {'Recording 3', 'Recording 4'} <= {*mixed} and mixed.count('bytes') == 4
     assert found.texts.count('silence: no answer to the poll') == 2
-    assert found.bars('ask') == 2
+    assert messages(tmp_path).bars('ask') == 2
     raw = tmp_path / 'raw'
     raw.write_bytes(b''.join(
         data for tns in range(45) for _, _, data in silence(0.0) + exchange(0.1, tns)))
     found = drawn(tmp_path, capsys, '--binary', str(raw))
     assert 'bytes' in found.texts
     assert [text for text in found.texts if text.startswith('byte ')] == ['byte 4', 'byte 2162']
-    assert found.bars('ask') == 45
+    assert messages(tmp_path).bars('ask') == 45
     assert {'r1s0', 'r1s1'} <= {element.get('id') for _, element in found.found}
     raw.write_bytes(exchange(0.1, 1)[3][2])  # a reply without its command, in the lower row
-    found = drawn(tmp_path, capsys, '--binary', '--duplex', 'full', str(raw))
-    assert [each['y'] for _, each in found.found if each.get('class') == 'odd'
-            and 'y' in each] == ['1', '15']
+    drawn(tmp_path, capsys, '--binary', '--duplex', 'full', str(raw))
+    assert [each['y'] for _, each in messages(tmp_path).found if each.get('class') == 'odd'
+            and 'y' in each] == ['15']
 
 
 def test_names_are_text_and_nothing_else(tmp_path: Path, capsys: Output) -> None:
@@ -249,9 +285,11 @@ def long_line(tmp_path: Path, capsys: Output, count: int) -> Path:
     drawn(tmp_path, capsys, capture(tmp_path / 'line.cap', *parts, silence(121.0, station=9),
                                     exchange(121.5, 1)))
     page = tmp_path / 'line.html'
-    found = browser.dom(page, tmp_path)
-    assert found.bars('ask') == count + 1
-    assert found.bars('missing') == 2
+    assert messages(tmp_path).bars('ask') == count + 1
+    assert messages(tmp_path).bars('missing') == 1
+    shown, written = browser.dom(page, tmp_path), browser.Elements(page.read_text('utf-8'))
+    for look in ('ask', 'answer', 'small', 'missing'):
+        assert shown.bars(look) == written.bars(look)
     return page
 
 
