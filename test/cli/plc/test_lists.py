@@ -81,14 +81,14 @@ def refusal(folder: Path, text: str | bytes, wanted: Wanted | None = None,
      'the scale of values has no raw values: made Read rows'),
     ('Min,Max', '-5,1500', {'Min': '-5', 'Max': '1500'}, ''),
     ('Length', '20', {'Length': '20', 'Command': 'ReadWrite'}, ''),
-    ('Length', '16', {'Length': '16', 'Command': 'Read'},
-     'Length 16 may count bits or bytes of one value: made Read rows'),
+    ('Length', '16', {'Length': '1', 'Command': 'Read'},
+     'Length 16 may count bits or bytes of one value: not used, made Read rows'),
+    ('Length', '0', {'Length': '1', 'Command': 'ReadWrite'}, ''),
     ('Invert', 'no', {'Command': 'ReadWrite'}, ''),
     ('Converter', 'x10', {'Command': 'Read'}, f'column "Converter"{STRANGE}'),
     ('Converter', '', {'Command': 'ReadWrite'}, ''),
     ('Wire No.,Drawing', '1000,7', {'Command': 'ReadWrite'}, ''),
     ('Unit', 'bar', {'Command': 'ReadWrite', 'Description': '[bar]'}, ''),
-    ('Unit', '2', {'Command': 'Read'}, f'column "Unit"{STRANGE}'),
     ('Tag Address', 'N7:5', {'Command': 'Read'}, f'column "Tag Address"{STRANGE}'),
     ('Tag Address', 'N7:0', {'Command': 'ReadWrite'}, ''),
     ('Read Only', 'yes', {'Command': 'Read'}, ''),
@@ -146,9 +146,9 @@ PLCS = '{},Tag,Address,Access\nPLC1,Run1,B3:0/1,RW\nPLC2,Run2,B3:0/1,RW\n'
 
 @for_all('name', [
     'PLC', 'Controller', 'Node Name', 'Device', 'I/O Device', 'Device Name', 'Connection',
-    'Channel', 'Machine', 'Line', 'Steuerung', 'Station', 'IP Address'])
+    'Channel', 'Machine', 'Line', 'Steuerung', 'Station', 'IP Address', 'Unit', 'Eng Units,Unit'])
 def test_rows_of_two_plcs_do_not_go_to_one(tmp_path: Path, name: str) -> None:
-    text = PLCS.format(name)
+    text = PLCS.format(name).replace('\nPLC', '\n,PLC' if ',' in name else '\nPLC')
     assert refusal(tmp_path, text) == (
         ': has rows of several PLCs: PLC1, PLC2; choose one with --plc NAME, or give the station '
         'of each with --station-of NAME=N,NAME=N')
@@ -186,6 +186,10 @@ def test_numbers_in_a_column_station_are_used(tmp_path: Path) -> None:
     # Two PLCs of one station number are on two lines.
     both = 'PLC,Station,Tag,Address\nPLC1,1,Run1,B3:0/1\nPLC2,1,Run2,B3:0/1\n'
     assert 'several PLCs: PLC1, PLC2' in refusal(tmp_path, both)
+    both += 'PLC1,2,Run3,B3:0/1\n'
+    assert 'several PLCs: PLC1, PLC2' in refusal(tmp_path, both)
+    made(tmp_path, both.replace('PLC2,1', 'PLC2,3'))
+    assert cells(tmp_path, 'Tag', 'Station') == [('Run1', '1'), ('Run2', '3'), ('Run3', '2')]
 
 
 def test_column_that_only_repeats_a_plc_does_not_divide_it(tmp_path: Path) -> None:
@@ -280,6 +284,53 @@ def test_names_of_columns_stand_below_titles_and_come_again(tmp_path: Path) -> N
     report = ',,,,App,\n,,,TAG REPORT,,\n,Name,Data Type,,Address,Access\n,Go,Boolean,,B3:0/0,R\n'
     made(tmp_path, report)
     assert cells(tmp_path, 'Tag', 'Address') == [('Go', 'B3:0/0')]
+
+
+@for_all(('text', 'commands', 'remark'), [
+    ('PLC 1,,\nRun1,B3:0/1,RW\nPLC 2,,\nRun2,B3:0/2,RW\n', ['Read', 'Read'],
+     'titles between the rows, such as "PLC 1", may name other PLCs: made Read rows (one file for '
+     'each PLC, or no titles)'),
+    ('Run1,B3:0/1,RW\nStation,7,\nRun2,B3:0/2,RW\n', ['Read', 'Read'],
+     'titles between the rows, such as "Station 7", may name other PLCs: made Read rows (one file '
+     'for each PLC, or no titles)'),
+    ('North,,\nRun1,B3:0/1,RW\nSouth,,\nRun2,B3:0/1,RW\nRun3,B3:0/3,RW\n', ['Read'] * 3,
+     'titles between the rows, such as "North", may name other PLCs: made Read rows (one file for '
+     'each PLC, or no titles)'),
+    ('North,,\nRun1,B3:0/1,RW\nSouth,,\nRun2,B3:0/2,RW\n', ['ReadWrite', 'ReadWrite'], ''),
+    ('PLC 1,,\nRun1,B3:0/1,RW\nRun2,B3:0/2,RW\n', ['ReadWrite', 'ReadWrite'], ''),
+    ('P1.Run,B3:0/1,RW\nP2.Run,b3:0/1,RW\nRun3,B3:0/3,RW\n', ['Read', 'Read', 'ReadWrite'],
+     'its address stands in another row, too, as if it were of another PLC: made Read rows')])
+def test_rows_that_may_belong_to_several_plcs_only_read(
+        tmp_path: Path, text: str, commands: list[str], remark: str) -> None:
+    result = made(tmp_path, f'Tag,Address,Access\n{text}')
+    assert [command for command, in cells(tmp_path, 'Command')] == commands
+    assert next(iter(+result.remarks), '') == remark
+
+
+@for_all(('text', 'expected'), [
+    ('Protocol ID,Device Name,Tag Name,Data Type,Retentive,Address\n0,<INTERNAL>,Local,Discrete,'
+     'FALSE,\n400,DEV1,Flow,Floating_PT_32,FALSE,F8:0\n400,DEV1,Count,BCD_int_16,FALSE,N7:0\n',
+     [('Flow', 'F8:0', 'float32', 'Read'), ('Count', 'N7:0', 'bcd16', 'Read')]),
+    ("'Variables\n'ID;Varname;Connection;Address;Length;InLo;InHi;OutLo;OutHi\n"
+     '5;Run;slc;B3:0/1;0;0;0;0;0\n6;Speed;slc;N7:0;0;0;100;0;10\n',
+     [('Run', 'B3:0/1', 'bool', 'Read'), ('Speed', 'N7:0', 'int16', 'Read')]),
+    ('#Tag,Address,Access\nSet,N7:0,RW\n', [('Set', 'N7:0', 'int16', 'ReadWrite')]),
+    ('Name;Connection;Data type;Length;Address\nSpeed;C1;Int;2;N7:0\nText;C1;String;82;ST9:0\n',
+     [('Speed', 'N7:0', 'int16', 'Read'), ('Text', 'ST9:0', 'string', 'Read')]),
+    ('Lfd. Nr.;Symbol;Operand;Datentyp;Schreibbar\n1;Soll;N7:10;INT;ja\n2;Ist;N7:11;INT;nein\n',
+     [('Soll', 'N7:10', 'int16', 'ReadWrite'), ('Ist', 'N7:11', 'int16', 'Read')]),
+    ('Repère;Adresse;Désignation;Lecture/Écriture\nVitesse;N7:0;x;L/E\nArret;B3:0/2;y;L\n',
+     [('Vitesse', 'N7:0', 'int16', 'ReadWrite'), ('Arret', 'B3:0/2', 'bool', 'Read')]),
+    ('Alias Name,Item Path,Read Only\nSpeed,CH1.PLC1.N7:0,0\n',
+     [('Speed', 'N7:0', 'int16', 'ReadWrite')]),
+    ('"Address","Name","Type","Offset","Scale","Write"\n"N7:0","Speed","int16","0","1","true"\n',
+     [('Speed', 'N7:0', 'int16', 'ReadWrite')]),
+    ('Tag,Command,Address,Word_Order,Type\nBig,ReadWrite,N7:2,High,int32\n',
+     [('Big', 'N7:2', 'int32', 'ReadWrite')])])
+def test_lists_of_other_programs(
+        tmp_path: Path, text: str, expected: list[tuple[str, ...]]) -> None:
+    made(tmp_path, text)
+    assert cells(tmp_path, 'Tag', 'Address', 'Type', 'Command') == expected
 
 
 def test_row_without_a_name_is_named_by_its_address(tmp_path: Path) -> None:

@@ -29,7 +29,7 @@ from abdf1_ros.cli.plc.exports.records import Record
 from abdf1_ros.errors import FormatError
 from abdf1_ros.numbers import decimal_number, two_readings, whole_number
 from abdf1_ros.pccc.families import parse_address
-from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.values import types_of, ValueType
 from abdf1_ros.settings.names import sanitise
 from abdf1_ros.text import shown
@@ -136,13 +136,15 @@ class ListRow:
     """
     A record, its columns by role: their names and texts.
 
-    ``strange`` names the columns with text that are not understood.
+    ``strange`` names the columns with text that are not understood. ``unclear`` has other reasons
+    why the row must not write.
     """
 
     record: Record
     cells: Mapping[Role, Sequence[tuple[str, str]]]
     node: str = ''
     strange: Sequence[str] = ()
+    unclear: Sequence[str] = ()
     is_dot_unclear: bool = False
 
     def __getitem__(self, role: Role) -> str:
@@ -198,9 +200,11 @@ class Form:
     names_all: bool = True
 
 
-_ITEM = re.compile(  # of RSLinx: =RSLINX|PLC1!'N7:0,L10,C1'; of OPC: ns=1;s=[PLC1]N7:0
+# Of RSLinx: =RSLINX|PLC1!'N7:0,L10,C1'; of OPC: ns=1;s=[PLC1]N7:0, CH1.PLC1.N7:0.
+_ITEM = re.compile(
     r"""(?:=?\w+\|(?P<topic>[^!]+)!'?)?(?:ns=\d+;s=)?\{?(?:::)?(?:\[(?P<node>[^]]+)\])?"""
-    r"""(?P<address>[^{}']+?)(?:,L(?P<length>\d{1,5})(?:,C\d{1,5})?)?\}?'?""", re.IGNORECASE)
+    r"""(?:(?P<device>[\w.\- ]+)[.:!](?=[A-Z]{1,3}\d{0,3}:\d))?(?P<address>[^{}']+?)"""
+    r"""(?:,L(?P<length>\d{1,5})(?:,C\d{1,5})?)?\}?'?""", re.IGNORECASE)
 _PROVIDER = re.compile(r'\[[A-Za-z]\w*\](?=\w)')  # of Ignition: [default]Tanks/Level
 _ARRAY = re.compile(r'(?P<address>[^\[]+?)\s*(?P<sizes>(?:\s*\[\d{1,5}\])+)')
 # For a MicroLogix the number may name a word of the file, for an SLC a slot.
@@ -212,15 +216,16 @@ _OCTAL = re.compile(r'[IO]\d?:\d+', re.IGNORECASE)
 _ACCESS = {word: command for command, words in {
     READ: 'r ro read readonly rd rdonly get readsubscribe writeprotected lesen nurlesen nurlesend '
           'lesend schreibgeschützt lecture lectureseule lectura sololectura lettura solalettura '
-          'leitura',
+          'leitura l',
     READ_WRITE: 'rw wr readwrite readandwrite writeread rdwr readwritesubscribe lesenschreiben '
                 'lesenundschreiben schreibenlesen lectureécriture lectureecriture '
-                'lecturaescritura letturascrittura leituraescrita',
+                'lecturaescritura letturascrittura leituraescrita le ls',
     WRITE: 'w wo write writeonly wr_only schreiben nurschreiben écriture ecriture escritura '
            'scrittura escrita'}.items() for word in words.split()}
 _YES = ('yes', 'true', 't', 'y', '1', 'ja', 'j', 'oui', 'si', 'sí', 'sim', 'vrai', 'wahr')
 _NO = ('no', 'false', 'f', 'n', '0', 'nein', 'non', 'não', 'falsch', 'faux', 'falso')
 _TWO_WORDS = [kind.value for kind in ValueType if kind.words == 2]
+_UNSCALED = ('none', 'off', 'noscale', 'noscaling', 'unscaled', 'raw', *_NO)
 _ORDERS = {'': '', 'low': 'Low', 'lowfirst': 'Low', 'lowwordfirst': 'Low', 'lowhigh': 'Low',
            'high': 'High', 'highfirst': 'High', 'highwordfirst': 'High', 'highlow': 'High'}
 
@@ -232,7 +237,7 @@ def squeezed(text: str) -> str:
 
 def heading(text: str) -> str:
     """Return the name of a column as forms have it: "Scan Rate (ms)" is scanrate."""
-    plain = re.sub(r'\([^)]*\)|\[[^]]*\]', '', text)
+    plain = re.sub(r'\([^()]*\)|\[[^][]*\]', '', text)
     return re.sub(r'[\W_]', '', plain).casefold() or text.casefold()
 
 
@@ -256,12 +261,14 @@ def read_row(form: Form, entry: ListRow, wanted: Wanted) -> FoundRow:
     match = _ITEM.fullmatch(address)
     if match:
         address, length = match['address'].strip(), match['length'] or ''
-        node = match['topic'] or match['node'] or node
+        node = match['topic'] or match['node'] or match['device'] or node
     remarks: list[str] = []
     if not tag and not form.names_all:
         tag = sanitise(address)
         remarks += ['has no name: named by its address'] if form.is_open else []
     try:
+        if not address:
+            raise Unusable('Address is missing')
         if form.path and not (match and match['node']):
             raise Unusable(f'{entry.named(Role.ADDRESS)} has no address, as in {form.path}')
         cells = _cells(form, entry, (address, length), wanted, remarks)
@@ -286,7 +293,15 @@ def _cells(form: Form, entry: ListRow, place: tuple[str, str], wanted: Wanted,
         if command == WRITE:
             raise Unusable('cannot be read, and --read-only is given')
         command, remarks[:] = READ, []
-    unclear = _unclear_parts(form, entry, (address, length, kind), wanted)
+    unclear = [*entry.unclear, *_unclear_parts(form, entry, (address, length, kind), wanted)]
+    words = _words(address, kind, wanted)
+    if form.is_open and entry[Role.LENGTH] and whole_number(length) in (2 * words, 16 * words):
+        unclear.append(f'Length {length} may count bits or bytes of one value: not used, made '
+                       'Read rows')
+        length = ''
+    elif form.is_open and length and _is_string(address, wanted):
+        remarks.append('Length of a string in an ST file is not used')
+        length = ''
     if command != READ:
         unclear += [f'column "{shown(name)}" is not understood: made Read rows (--ignore COLUMN, '
                     'if it says nothing about the words in the PLC)' for name in entry.strange]
@@ -305,7 +320,7 @@ def _cells(form: Form, entry: ListRow, place: tuple[str, str], wanted: Wanted,
     cells = {
         'Command': command, 'Address': address, 'Type': kind,
         'Length': length or ('' if kind else whole_length(address, wanted.plc_type)),
-        'Word_Order': order if _words(address, kind, wanted) == 2 else '',
+        'Word_Order': order if words == 2 else '',
         'Period': '' if command == WRITE else _period(entry, wanted),
         'Description': ' '.join(filter(None, texts)), **numbers,
         **(_limits(entry) if command != READ else {})}
@@ -320,7 +335,7 @@ def _counted(address: str, length: str, entry: ListRow) -> tuple[str, str]:
         for size in re.findall(r'\d+', match['sizes']):
             count *= int(size)
         told.append(str(count))
-    if len(different := {text for text in told if text} - {'1'}) > 1:
+    if len(different := {text for text in told if text} - {'0', '1'}) > 1:
         raise Unusable(f'has two numbers of elements, {" and ".join(sorted(different))}')
     return address, next(iter(different), '')
 
@@ -368,8 +383,6 @@ def _unclear_parts(form: Form, entry: ListRow, place: tuple[str, str, str],
     if words == 2 and not entry[Role.WORD_ORDER] and _words(address, '', wanted) < 2:
         unclear.append('which of its two words comes first is not in the file: made Read rows '
                        '(a column Word Order: Low or High)')
-    if entry[Role.LENGTH] and words and whole_number(length) in (2 * words, 16 * words):
-        unclear.append(f'Length {length} may count bits or bytes of one value: made Read rows')
     if not entry[Role.RAW_LOW] + entry[Role.RAW_HIGH] and entry[Role.LOW] + entry[Role.HIGH]:
         unclear.append('the scale of values has no raw values: made Read rows')
     return unclear
@@ -383,6 +396,13 @@ def _words(address: str, kind: str, wanted: Wanted) -> int:
         return types_of(parse_address(address, wanted.plc_type))[0].words
     except FormatError:
         return 1
+
+
+def _is_string(address: str, wanted: Wanted) -> bool:
+    try:
+        return parse_address(address, wanted.plc_type).file_type is FileType.STRING
+    except FormatError:
+        return False
 
 
 def _command(form: Form, entry: ListRow, remarks: list[str]) -> str:
@@ -414,17 +434,19 @@ def _period(entry: ListRow, wanted: Wanted) -> str:
 
 def _scaling(entry: ListRow) -> Cells:
     """Return Scale and Offset, as the file has them or for a straight line through both ends."""
-    mode, sign = entry[Role.SCALING].casefold(), 1.0
+    mode, sign = squeezed(entry[Role.SCALING]), 1.0
     if squeezed(entry[Role.NEGATE]) not in ('', *_NO):
         sign = -1.0
-    if mode not in ('', 'none', 'off', 'linear', *_NO):
+    if mode not in ('', *_UNSCALED, 'linear'):
         raise Unusable(f'{entry.named(Role.SCALING)} has no counterpart; Linear has')
-    is_line = mode == 'linear' or (not mode and entry[Role.RAW_LOW] + entry[Role.RAW_HIGH])
+    ends = [entry[role] for role in _ENDS]
+    is_line = mode == 'linear' or (
+        not mode and any(ends[:2]) and {number_of(end) for end in ends} != {0.0})
     factors = {'Scale': entry[Role.SCALE], 'Offset': entry[Role.OFFSET]}
     cells = {column: entry.number(text) for column, text in factors.items() if text}
     plain = {'Scale': '1', 'Offset': '0'}
     if is_line:
-        line = scaling([entry[role] for role in _ENDS], sign, entry.is_dot_unclear)
+        line = scaling(ends, sign, entry.is_dot_unclear)
         if cells and line != plain | cells:
             raise Unusable('has two scales, a factor and the ends of a line')
         return {} if line == plain else line

@@ -143,9 +143,10 @@ _TYPES = {word: kind for kind, words in {
     'int32': 'long dint i4 int4 longint longinteger doubleint doubleinteger',
     'uint32': 'dword udint ui4 ulong unsignedlong',
     'float32': 'float real single r4 real4 float4 float32 real32 32bitfloat 32bitreal ieee '
+               'floatingpt32 floatpt32 '
                'floatingpoint 32bitfloatingpoint gleitkomma réel reel',
-    'bcd16': 'bcd bcd16 4digitbcd bcd4', 'bcd12': 'bcd12 3digitbcd bcd3',
-    'string': 'string str text'}.items() for word in words.split(' ')}
+    'bcd16': 'bcd bcd16 4digitbcd bcd4 bcdint16 16bitbcd', 'bcd12': 'bcd12 3digitbcd bcd3',
+    'string': 'string str text asciistring'}.items() for word in words.split(' ')}
 _SIZED = re.compile(
     r'(?:(?P<first>16|32)bit)?(?P<sign>u|unsigned|s|signed)?(?P<int>int|integer|i)?'
     r'(?P<after>signed|unsigned)?(?P<last>16|32)?(?:bits?)?')
@@ -168,25 +169,28 @@ def _type_of(text: str) -> str | None:
 LIST = Form(
     'a list with a row that names its columns (--tag COLUMN --address COLUMN)', (), {
         role: words.split() for role, words in {
-            Role.TAG: 'tagname tag symbol symbolname devicetag tagpath name variable variablename '
-                      'signal signalname point pointname nom variablenname nombre nome etiqueta '
-                      'mnemonic',
+            Role.TAG: 'tagname tag symbol symbolname devicetag tagpath name *tagname variable '
+                      'varname variablename signal signalname point pointname tagno tagnr '
+                      'tagnumber aliasname alias nom variablenname nombre nome etiqueta repère '
+                      'repere mnemonic bmk',
             Role.ADDRESS: 'address plcaddress deviceaddress tagaddress dataaddress ioaddress '
-                          'itemname opcitempath itempath item adresse plcadresse spsadresse addr '
-                          'dirección direccion indirizzo endereço adres physicaladdress',
+                          'itemname opcitempath itempath item adresse operand addr '
+                          'dirección direccion indirizzo endereço adres *address *adresse',
             Role.TYPE: 'datatype type datentyp typ typededonnées typededonnee tipo tipodedato '
                        'tipodedatos tipodati rawdatatype rawtype vartype variabletype tagtype '
                        'devicedatatype nativetype',
             Role.DESCRIPTION: 'description* desc comment* beschreibung* bemerkung* kommentar* '
                               'libellé* libelle* documentation* descripción* descripcion* '
-                              'descrizione* descrição* tagdescription bezeichnung remark* note*',
-            Role.ACCESS: 'access clientaccess accessrights accessright accessmode accesstype '
+                              'descrizione* descrição* tagdescription bezeichnung* désignation* '
+                              'designation* bedeutung service remark* note* tooltip',
+            Role.ACCESS: 'access command lectureécriture lesenschreiben clientaccess '
+                         'accessrights accessright accessmode accesstype '
                          'attribute attributes readwrite rw zugriff zugriffsrecht zugriffsart '
                          'accès acces acceso accesso acesso permission permissions rights',
             Role.READ_ONLY: 'readonly ro nurlesen schreibgeschützt lectureseule sololectura '
                             'writeprotected isreadonly',
-            Role.WRITABLE: 'writable writeable iswritable writeaccess writeenable writeenabled '
-                           'canwrite allowwrite schreibbar beschreibbar inscriptible',
+            Role.WRITABLE: 'write writable writeable iswritable writeaccess writeenable '
+                           'writeenabled canwrite allowwrite schreibbar beschreibbar inscriptible',
             Role.PLC: 'plc plcname plcid plcno plcnumber plctype controller controllername cpu '
                       'cpuname processor processorname device devicename deviceid deviceno '
                       'iodevice iodevicename node nodename nodeid nodeno nodenumber nodeaddress '
@@ -195,7 +199,8 @@ LIST = Form(
                       'servername opcserver ioserver host hostname ip ipaddress network port '
                       'comport slave slaveid slaveaddress unitid rtu provider devicegroup '
                       'steuerung steuerungsname sps spsname gerät geraet gerätename automate '
-                      'autómata automata plcdevice source datasource target',
+                      'autómata automata plcdevice source datasource target stationname '
+                      'remotenode remotestation destination',
             Role.PLACE: 'machine machinename cell cellname area areaname line linename plant site '
                         'system systemname equipment skid maschine anlage linie zone ligne',
             Role.STATION: 'station stationnumber stationno stationaddress stationnr plcstation '
@@ -214,19 +219,20 @@ LIST = Form(
                         'skalierung skalierungsfaktor facteur decimal',
             Role.OFFSET: 'offset intercept bias versatz décalage',
             Role.RAW_LOW: 'rawlow rawmin minraw rawminimum rawzero rawzeroscale lowraw rawlo '
-                          'rawscalelow rawscalemin',
+                          'rawscalelow rawscalemin inlo inlow',
             Role.RAW_HIGH: 'rawhigh rawmax maxraw rawmaximum rawfull rawfullscale highraw rawhi '
-                           'rawscalehigh rawscalemax',
+                           'rawscalehigh rawscalemax inhi inhigh',
             Role.LOW: 'scaledlow scaledmin minscaled englow engmin mineng mineu eumin eulow '
-                      'engzero engzeroscale engineeringlow engscalelow engscalemin',
+                      'engzero engzeroscale engineeringlow engscalelow engscalemin outlo outlow',
             Role.HIGH: 'scaledhigh scaledmax maxscaled enghigh engmax maxeng maxeu eumax euhigh '
-                       'engfull engfullscale engineeringhigh engscalehigh engscalemax',
+                       'engfull engfullscale engineeringhigh engscalehigh engscalemax outhi '
+                       'outhigh',
             Role.MIN: 'min minimum minvalue valuemin lowlimit lowerlimit minanalog minwert',
             Role.MAX: 'max maximum maxvalue valuemax highlimit upperlimit maxanalog maxwert',
             Role.PERIOD: 'period scanrate updaterate pollrate pollingrate scaninterval '
                          'updateinterval pollinterval',
-            Role.UNIT: 'unit units engunit engunits engineeringunit engineeringunits einheit '
-                       'unité unite unidad uom egu',
+            Role.UNIT: 'engunits engunit engineeringunits engineeringunit units egu uom einheit '
+                       'unité unite unidad unit',
             Role.UNUSED: 'no nr # id row lfdnr group groupname taggroup folder path scope '
                          'scanclass scangroup logged datalogged eventlogged logging log history '
                          'historyenabled alarm* security* retentive* initial* deadband offlabel* '

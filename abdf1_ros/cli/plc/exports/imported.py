@@ -32,6 +32,7 @@ from abdf1_ros.settings.columns import NEEDED
 from abdf1_ros.settings.csv_table import Row
 from abdf1_ros.settings.map_file import MOST_ROWS
 from abdf1_ros.settings.map_row import RowReader
+from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.names import sanitise
 from abdf1_ros.text import printable, shown
 
@@ -107,7 +108,8 @@ def _stations(path: str, rows: Sequence[FoundRow],
 
     Raises ConfigurationError if the user named none of several PLCs, or an unknown PLC.
     """
-    good = [row for row in rows if not row.fault]
+    good = [row for row in rows if not row.fault and _checked(path, 1, {
+        **row.cells, 'Station': '1', 'PLC_Type': wanted.plc_type.value})[0]]
     names = dict.fromkeys(_name(row) for row in good)
     listed = ', '.join(shown(name) or '""' for name in names)
     for name in wanted.station_of or ([] if wanted.node is None else [wanted.node]):
@@ -116,9 +118,12 @@ def _stations(path: str, rows: Sequence[FoundRow],
                                                     f'{listed}')])
     if wanted.node is not None:
         names = {wanted.node: None}
-    has_stations = all(is_digits(row.station) for row in good) and not wanted.stations
-    in_one = {row.station for row in good if _name(row) in names} if has_stations else {''}
-    if not wanted.station_of and len(names) > len(in_one):
+    has_stations = not wanted.stations and bool(good) and all(
+        is_digits(row.station) for row in good)
+    # By station, if the file has them: two PLCs of one station are on two lines.
+    plcs = {(row.station if has_stations else '', _name(row)) for row in good
+            if _name(row) in names}
+    if not wanted.station_of and len(plcs) > len({station for station, _ in plcs}):
         raise ConfigurationError([Problem(path, (
             f'has rows of several PLCs: {listed}; choose one with --plc NAME, or give the station '
             'of each with --station-of NAME=N,NAME=N'))])
@@ -161,9 +166,8 @@ def _add(result: Import, seen: dict[str, int], path: str, record: Record, found:
     """Add the good rows of a record, or the reason why it is left out."""
     names, fault = [], ''
     for row in rows:
-        reader = RowReader(Row(path, record.line, record.line, row, {}))
-        if (mapping := reader.read()) is None:
-            fault = '; '.join(fault.words() for fault in reader.faults)
+        mapping, fault = _checked(path, record.line, row)
+        if mapping is None:
             break
         names.append(mapping.name)
     if not fault and (clash := seen.get(names[0])):
@@ -175,6 +179,12 @@ def _add(result: Import, seen: dict[str, int], path: str, record: Record, found:
     result.count += len(names)
     result.remarks.update(dict.fromkeys(found.remarks, 1))
     result.lines += (_csv_line(cells, result.columns) for cells in rows)
+
+
+def _checked(path: str, line: int, cells: Cells) -> tuple[Mapping | None, str]:
+    """Return the mapping that a row of a map makes, or its faults."""
+    reader = RowReader(Row(path, line, line, cells, {}))
+    return reader.read(), '; '.join(fault.words() for fault in reader.faults)
 
 
 def _leave_out(result: Import, path: str, record: Record, cells: Cells, text: str) -> None:

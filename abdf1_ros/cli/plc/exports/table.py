@@ -20,8 +20,10 @@ A column is used, or it is named as not used, or rows with text in it do not wri
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from fnmatch import fnmatchcase
 import re
 
 from abdf1_ros.cli.plc.exports.form import Form, heading, Ignored, ListRow, ONE, Role, Wanted
@@ -52,6 +54,12 @@ _OURS = {'tag', 'command', 'address', 'station', 'plctype'}
 _NOTHING = ('', '-')
 _LOOKED_AT = 100  # records among which the row of names has to be
 
+_NAMES_PLC = re.compile(r'\d+|[A-Za-z]{3,}[ _-]?\d+')  # in a column Unit
+# Titles that may say that the rows below them belong to another PLC.
+_PLC_TITLE = re.compile(
+    r'\b(?:plc|sps|cpu|slc|micrologix|controller|processor|device|station|node|steuerung|automate|'
+    r'machine|maschine|line|linie|ligne|cell|zelle|unit|panel)(?:\b|_|\d)', re.IGNORECASE)
+_DOUBLE = ('its address stands in another row, too, as if it were of another PLC: made Read rows')
 _SCOPE = re.compile(r'0?|global|local.*', re.IGNORECASE)
 _SYMBOL = re.compile(r'[A-Za-z_]\w{0,31}|', re.ASCII)
 _OTHER_ROWS = re.compile(r'(?P<what>DFILE|PFILE|LAD|RUNG)', re.IGNORECASE)
@@ -88,7 +96,6 @@ class _Columns:
             return Ignored(what), []
         known = {key for keys in self.roles.values() for key in keys}
         strange = [key for key in keys if key not in known] if self.form.is_open else []
-        strange += [key for key in self.roles.get(Role.UNIT, ()) if texts.get(key, '').isdigit()]
         cells: dict[Role, list[tuple[str, str]]] = {
             role: [(self.names[key], texts.get(key, '')) for key in keys]
             for role, keys in self.roles.items() if role is not Role.UNUSED}
@@ -97,7 +104,7 @@ class _Columns:
                 for key in (*strange, *self.roles[Role.UNUSED])
                 if texts.get(key, '') not in _NOTHING}
         return (ListRow(record, cells, node, [told[key] for key in strange if key in told],
-                        sheet.is_dot_unclear), list(told.values()))
+                        (), sheet.is_dot_unclear), list(told.values()))
 
 
 def table_of(sheet: Sheet, wanted: Wanted) -> Listing:
@@ -126,30 +133,62 @@ def _is_head(form: Form, record: Record) -> bool:
 
 def _read(form: Form, sheet: Sheet, wanted: Wanted, head: Record | None = None) -> Listing:
     """Read the records below the first row of names, which may come again with others."""
-    table, columns = Listing(form), None
+    table, columns, title = Listing(form), None, ''
+    sections: dict[str, set[str]] = {}
     for record in sheet.records:
-        is_next = record is head or (columns is not None and head is not None and _is_again(
-            columns, record)) or (head is None and (
-                record.first.startswith(form.mark) if form.mark else _is_head(form, record)))
+        if head is not None:
+            is_next = record is head or (columns is not None and _is_again(record))
+        else:
+            is_next = record.first.startswith(form.mark) if form.mark else _is_head(form, record)
         found: ListRow | Ignored = Ignored()
         if is_next:
             columns = _columns(form, sheet, record, wanted)
         elif columns is None or record.first.lower().startswith(form.comments):
             pass
         elif form.is_open and _is_title(columns, record):
-            found = Ignored('lines with one cell, such as titles')
+            found, title = Ignored('lines with one cell, such as titles'), max(record.cells)
         else:
             found, unused = columns.entry(sheet, record)
             table.unused |= dict.fromkeys(unused)
+            if isinstance(found, ListRow):
+                if not looks_like_address(found[Role.ADDRESS]) and _PLC_TITLE.search(record.first):
+                    title = ' '.join(record.cells).strip()
+                sections.setdefault(title, set()).add(found[Role.ADDRESS])
         table.rows.append((record, found))
+    return _with_doubles(table, _mixed(sections)) if form.is_open else table
+
+
+def _with_doubles(table: Listing, reason: str) -> Listing:
+    """Return the rows; ``reason`` is why none may write, and a row like another has its own."""
+    def place(row: ListRow) -> tuple[str, ...]:
+        return row.node, row[Role.STATION], row[Role.ADDRESS].upper(), row[Role.BIT]
+
+    count = Counter(place(row) for _, row in table.rows if isinstance(row, ListRow))
+    for number, (record, row) in enumerate(table.rows):
+        if isinstance(row, ListRow):
+            double = _DOUBLE if count[place(row)] > 1 else ''
+            table.rows[number] = record, replace(
+                row, unclear=[*filter(None, [reason, double])])
     return table
 
 
-def _is_again(columns: _Columns, record: Record) -> bool:
+def _mixed(sections: dict[str, set[str]]) -> str:
+    """Return why rows below titles may belong to several PLCs; empty if nothing says so."""
+    told = [title for title in sections if _PLC_TITLE.search(title)]
+    count = sum(map(len, sections.values()))
+    if len(sections) < 2 or not (told or len(set().union(*sections.values())) < count):
+        return ''
+    name = shown((told or [title for title in sections if title])[0])
+    return (f'titles between the rows, such as "{name}", may name other PLCs: made Read rows '
+            '(one file for each PLC, or no titles)')
+
+
+def _is_again(record: Record) -> bool:
     """Tell whether a record of a list is another row of names."""
+    if any(map(looks_like_address, record.cells)):
+        return False
     roles = _roles(LIST, _headings(record))
-    return Role.TAG in roles and Role.ADDRESS in roles and not any(
-        map(looks_like_address, record.cells)) and len(roles) > 1
+    return Role.TAG in roles and Role.ADDRESS in roles
 
 
 def _is_title(columns: _Columns, record: Record) -> bool:
@@ -163,8 +202,10 @@ def _roles(form: Form, keys: Sequence[str]) -> dict[Role, list[str]]:
     for role, patterns in form.names.items():
         for pattern in patterns:
             found.setdefault(role, []).extend(
-                key for key in keys if key.partition(' ')[0] == pattern or (
-                    pattern.endswith('*') and key.startswith(pattern[:-1])))
+                key for key in keys if fnmatchcase(key.partition(' ')[0], pattern))
+    if Role.ADDRESS in found:  # an IP Address is none of a word
+        others = {key for role in (Role.PLC, Role.STATION) for key in found.get(role, ())}
+        found[Role.ADDRESS] = [key for key in found[Role.ADDRESS] if key not in others]
     return {role: [key for key in keys if key in found[role]] if role in _ALL else
             list(dict.fromkeys(found[role])) for role in found if found[role]}
 
@@ -230,6 +271,10 @@ def _choose(sheet: Sheet, head: Record, names: dict[str, str],
         roles[Role.PLC] = places
     if roles[Role.ADDRESS][0] == 'opcitempath':  # types of Ignition, not of the PLC
         roles[Role.UNUSED] += roles.pop(Role.TYPE, [])
+    units = roles.get(Role.UNIT, [])
+    if len(units) > 1 or any(map(_NAMES_PLC.fullmatch, (
+            text for key in units[-1:] for text in texts[key]))):
+        roles.setdefault(Role.PLC, []).append(units.pop())
     if Role.SCALE not in roles:
         roles.pop(Role.OFFSET, None)  # of an address, perhaps
     period = ''.join(names[key] for key in roles.get(Role.PERIOD, []))
@@ -274,6 +319,8 @@ def _head_of_list(sheet: Sheet, wanted: Wanted) -> Record | None:
                 [cell for cell in record.cells if cell]) > 1:
             heads.append(record)
     head = max(heads, key=rank, default=None)
+    if head is None or rank(head) < 5:
+        head = next((record for record in sheet.records[:_LOOKED_AT] if rank(record) > 10), None)
     if head is None or rank(head) < 5:
         return None
     if set(_headings(head)) >= _OURS:
