@@ -316,6 +316,8 @@ def _text(found: Findings, report: Report | None) -> str:
               for remark in remarks]
     if found.mappings:
         parts += ['', _line_text(report), '', _folded(_rows_text(report))]
+        if bits := _bits_text(report.mappings):
+            parts += ['', _folded(bits)]
         if not report.network.line_mode.only_listens:
             parts += ['', _folded(_plan_text(report)), '', _times_text(report)]
     parts += [f'note: {printable(note)}' for note in report.notes()]
@@ -358,7 +360,7 @@ def _listening_text(report: Report) -> str:
 
 def _rows_text(report: Report) -> str:
     """Return a table of the rows, with topic and message type of each."""
-    rows = [[_cell(value) for name, value in row.items() if name != 'command']
+    rows = [[_cell(value) for name, value in row.items() if name not in ('command', 'bits')]
             for row in _rows(report.mappings, report)]
     last = 'description' if any(row[-1] for row in rows) else ''
     head = 'tag', 'address', 'station', 'topic', 'message', 'Length', 'value', 'stale ms', last
@@ -385,7 +387,17 @@ def _row(mapping: Mapping, stale: float | None) -> dict[str, object]:
         'message': mapping.message_type.message if topics else '', 'length': mapping.length,
         'value': mapping.type.value + _formula(mapping.scaling),
         'stale_ms': None if stale is None else math.ceil(stale * 1000),
-        'description': mapping.description}
+        'description': mapping.description} | ({
+            'bits': {str(mapping.place_of(number)): name
+                     for number, name in enumerate(mapping.bits) if name}} if mapping.bits else {})
+
+
+def _bits_text(mappings: Sequence[Mapping]) -> str:
+    """Return a table of the bits with names; empty if there are none."""
+    rows = [(printable(name), str(mapping.place_of(number)), str(mapping.station),
+             printable(mapping.tag))
+            for mapping in mappings for number, name in enumerate(mapping.bits) if name]
+    return table(('bit', 'address', 'station', 'of the row'), rows, right=(2,)) if rows else ''
 
 
 def _formula(scaling: Scaling | None) -> str:

@@ -75,6 +75,9 @@ _TIMES = whole(0, MAX_PERIOD, 'ms')
 _PERIOD = ValueKind(_period, f'{_TIMES.right}, or "{ON_DEMAND}"', 0, MAX_PERIOD)
 
 _WORDS = ValueKind(lambda text: tuple(text.split()))
+BETWEEN_NAMES = ' | '
+_NAMES = ValueKind(lambda text: tuple(
+    ' '.join(name.split()) for name in text.split(BETWEEN_NAMES.strip())))
 _READ_WRITE = {'r/w', 'rw', 'read/write'}
 _TYPE = one_of({kind.value: kind for kind in ValueType}, type_name)
 _NUMBER = ValueKind(_number, 'a number', why_not=_clear_number)
@@ -100,6 +103,7 @@ class Column:
     - ``commands``: commands of the rows that may have the column.
     - ``idle``: commands of the rows in which the column has no effect. A cell there gives a
       remark, not a fault.
+    - ``between``: what stands between the parts of a value.
     """
 
     name: str
@@ -109,6 +113,7 @@ class Column:
     attribute: str = ''
     commands: tuple[Command, ...] = tuple(Command)
     idle: tuple[Command, ...] = ()
+    between: str = ' '
 
     def __post_init__(self) -> None:
         """Find the attribute."""
@@ -117,7 +122,7 @@ class Column:
     def text(self, mapping: Mapping) -> str:
         """Return the value of a mapping as text, defaults filled in."""
         value = _value_of(mapping, self.attribute)
-        return ' '.join(map(_text, value)) if isinstance(value, tuple) else _text(value)
+        return self.between.join(map(_text, value)) if isinstance(value, tuple) else _text(value)
 
     def why_not(self, command: Command) -> str:
         """Return why rows with this command must not have the column; empty if they may."""
@@ -244,6 +249,10 @@ MAP_COLUMNS = (
            'Yes: while the topic of a row with Fallback has more than one publisher, all its '
            'messages are refused, and the Fallback is written',
            kind=YES_OR_NO, commands=(Command.WRITE, Command.SERVE)),
+    Column('Bits', 'none',
+           'bool: a name for each bit, with | between, as many as Length; nothing between two | '
+           'for a bit without a name: doors closed | | drive 3 fault',
+           kind=_NAMES, commands=_TOPICS, between=BETWEEN_NAMES),
 )
 
 BY_NAME = {column.name: column for column in MAP_COLUMNS}

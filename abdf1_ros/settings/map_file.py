@@ -73,7 +73,7 @@ def load_mappings(path: str) -> tuple[Rows, list[Problem]]:
         rows = rows.without(mapping for mapping, _ in broken)
     if not table.is_usable:
         raise ConfigurationError(problems)
-    return rows, problems
+    return rows.with_bit_names(), problems
 
 
 def broken_links(mappings: Rows) -> Iterator[tuple[Mapping, CellFault]]:

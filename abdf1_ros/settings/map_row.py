@@ -41,7 +41,7 @@ from abdf1_ros.settings.mapping import Command, Mapping, ON_DEMAND, READ_ONLY
 from abdf1_ros.settings.names import MAX_LENGTH, sanitise
 from abdf1_ros.settings.remarks import having, row_remarks
 from abdf1_ros.settings.scaling import Scaling
-from abdf1_ros.text import shown
+from abdf1_ros.text import counted, shown
 
 _PLC_TYPE_NAMES = tuple(entry.value for entry in FAMILIES)
 
@@ -278,6 +278,7 @@ class RowReader:
         self._check_extent(mapping)
         if mapping.writes and not self.faults:
             self._check_write(mapping)
+        self._check_bits(mapping)
         for column in ('Min', 'Max'):
             if mapping.type is ValueType.STRING and self._row.get(column):
                 self._fault(column, f'a string has no {column}', is_superfluous=True)
@@ -290,6 +291,18 @@ class RowReader:
         if mapping.address.file_type is FileType.STRING and mapping.length != 1:
             self._fault('Length', (
                 'a string mapping has Length 1: give each string its own address'))
+
+    def _check_bits(self, mapping: Mapping) -> None:
+        names = [name for name in mapping.bits if name]
+        if mapping.bits and mapping.type is not ValueType.BOOL:
+            self._fault('Bits', f'Bits names the bits of a bool row, not those of '
+                                f'{mapping.type.value} values', is_superfluous=True)
+        elif len(mapping.bits) not in (0, mapping.length):
+            self._fault('Bits', f'Bits has {counted(len(mapping.bits), "name")}, Length is '
+                                f'{mapping.length}: write | between the names, and nothing '
+                                'between two | for a bit without a name')
+        elif twice := [name for name in dict.fromkeys(names) if names.count(name) > 1]:
+            self._fault('Bits', f'Bits has the name "{shown(twice[0])}" twice')
 
     def _check_values(self, mapping: Mapping) -> None:
         """Check the conversion of raw values to values of the topic."""

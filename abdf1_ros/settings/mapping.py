@@ -82,7 +82,7 @@ class Mapping:
     - ``single_publisher``: no message is taken while the topic has more than one publisher.
     - ``write_again``: ms after which a value that the PLC holds is written again.
     - ``confirms``: tag of the heartbeat whose control the bit confirms, empty for none.
-    - ``description``: free text.
+    - ``description``: free text; ``bits``: a name for each bit, or none at all.
     - ``remarks``: unusual settings of the row.
     """
 
@@ -109,6 +109,7 @@ class Mapping:
     is_read_only: bool = False
     via: int | None = None
     description: str = ''
+    bits: tuple[str, ...] = ()
     fallback: Fallback | None = None
     condition: While | None = None
     confirms: str = ''
@@ -270,6 +271,15 @@ class Mapping:
 
     def _masks(self, first: int, end: int) -> list[int]:
         return self.codec.masks()[first - self.extent.first:end - self.extent.first]
+
+    def name_of(self, number: int) -> str:
+        """Return the name of a bit of the row, counted from 0; empty if it has none."""
+        return self.bits[number] if self.bits else ''
+
+    def named_places(self) -> list[str]:
+        """Return the name of each bit of the row, or the address of a value without a name."""
+        return [self.name_of(number) or str(self.place_of(number))
+                for number in range(self.length)]
 
     def place_of(self, number: int) -> Address:
         """Return the address of a value of the row, counted from 0."""

@@ -17,10 +17,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from functools import cached_property
 
 from abdf1_ros.df1.packet import BROADCAST
+from abdf1_ros.pccc.values import ValueType
+from abdf1_ros.problems import Problem
 from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.names import sanitise
+from abdf1_ros.text import shown
 
 
 def _group(belongs: Callable[[Mapping], object]) -> cached_property[Rows]:
@@ -82,3 +87,40 @@ class Rows(tuple[Mapping, ...]):
         """Return the rows that are not among ``others``."""
         left_out = {*others}
         return Rows(row for row in self if row not in left_out)
+
+    def with_bit_names(self) -> Rows:
+        """
+        Return these rows with the names of bits as they are shown.
+
+        A bit that is a row of its own is named by the tag of that row. If the column Bits, or the
+        Bits of two rows, give one bit another name, the row has a remark.
+        """
+        if not any(row.bits for row in self):
+            return self
+        named = {_bit(row, 0): (row.tag, row) for row in self
+                 if row.type is ValueType.BOOL and row.length == 1}
+        return Rows(_named(row, named) if row.bits else row for row in self)
+
+
+_Bit = tuple[int, str]
+
+
+def _bit(row: Mapping, number: int) -> _Bit:
+    return row.extent.station, str(row.place_of(number))
+
+
+def _named(row: Mapping, known: dict[_Bit, tuple[str, Mapping]]) -> Mapping:
+    """Return a row with the names of its bits; ``known`` has the names so far, with their rows."""
+    bits, remarks = [], []
+    for number, name in enumerate(row.bits):
+        other, owner = known.get(_bit(row, number), ('', row))
+        if name and other and sanitise(name).lower() != sanitise(other).lower():
+            whose = ', the Tag of its own row, which is shown' if owner.length == 1 else \
+                f' in the row {shown(owner.tag)}'
+            remarks.append(Problem(replace(row.place, column='Bits'), (
+                f'{row.place_of(number)} has two names: "{shown(name)}", and "{shown(other)}"'
+                f'{whose}')))
+        bits.append(other if other and owner.length == 1 else name)
+        if name:
+            known.setdefault(_bit(row, number), (name, row))
+    return replace(row, bits=tuple(bits), remarks=(*row.remarks, *remarks))

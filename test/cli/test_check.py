@@ -60,6 +60,22 @@ def check(files: Paths, capsys: Output) -> Check:
     return run
 
 
+def test_names_of_bits_are_listed(files: Paths, capsys: Output) -> None:
+    write_csv(files[0], NET_HEADER, [GOOD_NET])
+    write_csv(files[1], f'{MAP_HEADER},Bits', [
+        'cell,Read,B3:0/0,1,PLC5,3,,closed | | drive 3 fault', f'{GOOD_ROW},',
+        'fault,Read,B3:0/2,1,PLC5,,,'])
+    assert main([*map(str, files)]) == 0
+    out = capsys.readouterr().out
+    assert ('bit     address  station  of the row\nclosed  B3:0/0         1  cell\n'
+            'fault   B3:0/2         1  cell\n\n') in out
+    assert 'map.csv:2 (Bits): B3:0/2 has two names: "drive 3 fault", and "fault", the Tag' in out
+    assert main(['--json', *map(str, files)]) == 0
+    rows = json.loads(capsys.readouterr().out)['rows']
+    assert [row.get('bits') for row in rows] == [
+        {'B3:0/0': 'closed', 'B3:0/2': 'fault'}, None, None]
+
+
 def test_good_files_show_their_plan_and_no_error(check: Check) -> None:
     out = check(GOOD_NET, (GOOD_ROW,))
     assert 'error' not in out.replace('no errors', '')

@@ -55,6 +55,14 @@ class Bench:
         return self.status.judge(self.now)
 
 
+def test_bit_with_a_name_is_told_by_it() -> None:
+    bench = Bench(Bits='|drive 3 fault', Description='Drives')
+    bench.read(1, 1)
+    assert bench.says() == (
+        ERROR, 'B3:0/3 for 0.0 s, 1 time, drive 3 fault for 0.0 s, 1 time: Drives')
+    assert [*bench.status.values(bench.now)] == ['B3:0/3', 'drive 3 fault']
+
+
 def test_bits_are_alarms_each_for_itself() -> None:
     bench = Bench(Description='Guard doors')
     bench.read(0, 0)

@@ -705,6 +705,16 @@ def test_many_faults_of_the_map_are_not_all_repeated(make_bench: Benches) -> Non
     assert values['left out, more'] == '1 more fault; the log and "check" have them all'
 
 
+def test_names_of_bits_are_told_by_topic(tmp_path: Path) -> None:
+    bench = Bench(tmp_path, ('plain,Read,B3:1/0,1,PLC5,1000,2,,',
+                             'words,Read,N7:0,1,PLC5,1000,2,,',
+                             'cell,Read,B3:0/0,1,PLC5,1000,3,doors,closed | | fault'),
+                  header=f'{HEADER},Length,Topic,Bits')
+    values = bench.details('mappings')
+    found = {key: text for key, text in values.items() if key.startswith(view.NAMES_OF_BITS)}
+    assert found == {'names of bits, doors': 'closed | B3:0/1 | fault'}
+
+
 def test_mappings_from_the_start_until_they_are_stale(bench: Bench) -> None:
     assert bench.says('mappings') == (WARN, 'WARN: of 2 mappings 2 waiting for the first read')
     assert bench.details('mappings')['speed'] == \

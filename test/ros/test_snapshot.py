@@ -78,6 +78,15 @@ def test_each_value_of_an_array_has_a_key(
     assert found == keys
 
 
+def test_names_of_bits_are_keys() -> None:
+    row = make_mapping('B3:0/15', length=3, bits=('doors closed', '', 'odd\n'))
+    found = {key: text for key, text in details(status_of(row, array('B', [1, 0, 1]))).items()
+             if key.startswith('value')}
+    assert found == {'value doors closed': '1', 'value B3:1/0': '0', r'value odd\n': '1'}
+    many = make_mapping('B3:0/0', length=40, bits=tuple(f'bit {number}' for number in range(40)))
+    assert 'value bit 39' in details(status_of(many, array('B', bytes(40))))
+
+
 @for_all(('values', 'age', 'error', 'level', 'message'), [
     (array('h', [7]), 2.0, None, OK, 'OK: 7, 2.0 s ago'),  # late, and not stale yet
     (array('h', [7]), -0.04, None, OK, 'OK: 7, 0.0 s ago'),  # read while the snapshot is made

@@ -29,6 +29,7 @@ from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.columns import COLUMNS
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Command, Publish
+from abdf1_ros.settings.rows import Rows
 from abdf1_ros.settings.scaling import Scaling
 import pytest
 from support.cases import for_all
@@ -570,3 +571,68 @@ def test_similar_tag_is_looked_for_a_limited_number_of_times() -> None:
                for number in range(30)]
     told = faults(row(Tag='speed', Command='Read'), *guarded)
     assert [text.endswith('did you mean speed?') for text in told] == 20 * [True] + 10 * [False]
+
+
+def bits(names: str, **cells: str) -> str:
+    """Return a row with names of bits."""
+    return row(**{'Command': 'Read', 'Address': 'B3:0/0', 'Length': '3', 'Bits': names} | cells)
+
+
+def told_of(mappings: Rows) -> list[str]:
+    """Return the remarks on all rows, without the name of the file."""
+    return [str(remark).partition('map.csv:')[2] for row in mappings for remark in row.remarks]
+
+
+@for_all(('names', 'kept', 'text'), [
+    ('doors closed|drive 3 fault|ready', ('doors closed', 'drive 3 fault', 'ready'),
+     'doors closed | drive 3 fault | ready'),
+    (' a  b | | c ', ('a b', '', 'c'), 'a b |  | c'), ('', (), '')])
+def test_bits_have_names(names: str, kept: tuple[str, ...], text: str) -> None:
+    mappings, problems = load_rows(bits(names))
+    assert problems == []
+    assert (mappings[0].bits, cell_of(mappings[0], 'Bits')) == (kept, text)
+    assert [mappings[0].name_of(number) for number in range(3)] == [*(kept or ('', '', ''))]
+    assert mappings[0].named_places() == [
+        name or f'B3:0/{number}' for number, name in enumerate(kept or ('', '', ''))]
+    assert mappings[0].remarks == ()
+
+
+@for_all(('cells', 'text'), [
+    ({'names': 'a|b'}, 'Bits has 2 names, Length is 3: write | between the names, and nothing '
+     'between two | for a bit without a name'),
+    ({'names': 'a b c'}, 'Bits has 1 name, Length is 3'),
+    ({'names': 'a|b|c|d'}, 'Bits has 4 names'),
+    ({'names': 'a|b|a'}, 'Bits has the name "a" twice'),
+    ({'names': 'a|b|c', 'Address': 'N7:0'}, 'Bits names the bits of a bool row, not those of '
+     'int16 values; leave the cell empty'),
+    ({'names': 'a', 'Address': 'N7:0', 'Length': '', 'Command': 'Heartbeat'},
+     'a Heartbeat row has no Bits')])
+def test_names_that_are_not_one_for_each_bit_are_refused(cells: dict[str, str], text: str) -> None:
+    found, = faults(bits(**cells))
+    assert '(Bits): Item: 1, ' in found and text in found
+
+
+def test_tag_of_a_row_of_one_bit_is_its_name() -> None:
+    mappings, problems = load_rows(
+        bits('doors closed|drive 3 fault|'), row(Tag='door', Command='Read', Address='B3:0/0'),
+        row(Tag='Drive_3_fault', Command='Read', Address='B3:0/1'),
+        row(Tag='ready', Command='Write', Address='B3:0/2'),
+        row(Tag='there', Command='Read', Address='B3:0/1', Station='2'),
+        row(Tag='word', Command='Read', Address='B3:0'),
+        row(Tag='own', Command='Read', Address='B3:1/0', Bits='other'))
+    assert problems == []
+    assert mappings[0].bits == ('door', 'Drive_3_fault', 'ready')
+    assert mappings[-1].bits == ('own',)
+    assert told_of(mappings) == [
+        '2 (Bits): B3:0/0 has two names: "doors closed", and "door", the Tag of its own row, '
+        'which is shown',
+        '8 (Bits): B3:1/0 has two names: "other", and "own", the Tag of its own row, which is '
+        'shown']
+
+
+def test_two_rows_that_give_a_bit_two_names_are_told() -> None:
+    mappings, _ = load_rows(
+        bits('a|b|c'), bits('B|d|', Tag='more', Address='B3:0/1'),
+        bits('x|y|z', Tag='there', Station='2'))
+    assert [row.bits for row in mappings] == [('a', 'b', 'c'), ('B', 'd', ''), ('x', 'y', 'z')]
+    assert told_of(mappings) == ['3 (Bits): B3:0/2 has two names: "d", and "c" in the row a']

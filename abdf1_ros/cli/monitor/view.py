@@ -28,6 +28,7 @@ import textwrap
 
 from abdf1_ros.cli.monitor import curves
 from abdf1_ros.numbers import decimal_number
+from abdf1_ros.settings.columns import BETWEEN_NAMES
 from abdf1_ros.text import BARS, counted, cut, printable, value_text
 
 # A bridge without diagnostics for this time (s) counts as silent. By default they come every
@@ -54,6 +55,7 @@ LINK_KEYS = ('settings', 'transactions per second', 'line load', 'poll cycle wit
              'longest poll cycle with Periods', 'expected poll cycle, 10 ms an answer')
 _PERIOD = 'period '  # beginning of keys of the link about a Period
 LOAD_BY_TOPIC = 'line load by topic'
+NAMES_OF_BITS = 'names of bits, '  # beginning of keys of the mappings; the topic follows
 STATION_KEYS = ('last answer', 'transactions without reply', 'error replies', 'processor',
                 'mode', 'faults')
 
@@ -325,14 +327,16 @@ def _values(snapshot: NodeView, now: float, width: int, bars: str) -> Iterator[T
     longest = min(_NAME_WIDTH, width // 3)
     names = [cut(printable(reading.topic), longest) for reading in snapshot.readings]
     widths = _Widths.of(max(map(len, ['topic', *names])), width)
-    loads = _loads(snapshot)
+    loads, bits = _loads(snapshot), _names_of_bits(snapshot)
     heads = 'topic', 'address', 'age', 'state', 'load', f'last {curves.SECONDS:g} s', 'value'
     yield TextLine(widths.row(*heads), Style.TITLE)
     for name, reading in zip(names, snapshot.readings, strict=True):
         state, style = reading.state(now)
         age = value = curve = ''
         if reading.values is not None:
-            age, value = f'{now - reading.received:.1f} s', show(reading.values, widths.value)
+            age = f'{now - reading.received:.1f} s'
+            value = _show_bits(reading.values, bits.get(reading.topic, ()), widths.value) \
+                or show(reading.values, widths.value)
         if reading.curve and widths.curve:
             curve = reading.curve.draw(now, reading.promised, bars)
         yield TextLine(widths.row(name, printable(reading.address), age, state,
@@ -349,6 +353,21 @@ def _loads(snapshot: NodeView) -> dict[str, str]:
     return {topic: load for topic, _, load in pairs}
 
 
+def _names_of_bits(snapshot: NodeView) -> dict[str, Sequence[str]]:
+    """Return the names of the bits of each topic that has such names."""
+    return {key.removeprefix(NAMES_OF_BITS): printable(value).split(BETWEEN_NAMES)
+            for status in _section(snapshot, 'mappings') for key, value in status.values.items()
+            if key.startswith(NAMES_OF_BITS)}
+
+
+def _show_bits(values: Sequence[float] | str, names: Sequence[str], width: int) -> str:
+    """Return the names of the bits that are 1; empty if the bits have no names."""
+    if isinstance(values, str) or not names or len(values) != len(names):
+        return ''
+    return cut(', '.join(name for name, value in zip(names, values, strict=True) if value)
+               or f'all {len(names)} are 0', width)
+
+
 def _reasons(snapshot: NodeView, width: int) -> Iterator[TextLine]:
     """Yield the faults, the worst first, with each bad row of the map."""
     shown = (status for status in snapshot.statuses if status.style is not Style.GOOD
@@ -357,7 +376,8 @@ def _reasons(snapshot: NodeView, width: int) -> Iterator[TextLine]:
         yield from _summary(status.section, status, width)
         if status.section == 'mappings':
             for key, value in status.values.items():
-                if not value.isdecimal():  # the counts are in the summary
+                # The counts are in the summary, and the names beside the values.
+                if not value.isdecimal() and not key.startswith(NAMES_OF_BITS):
                     yield from _wrapped(f'{key}: {value}', width, status.style)
 
 

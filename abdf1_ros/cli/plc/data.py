@@ -303,9 +303,8 @@ def tags_of(mappings: Rows, station: int) -> Tags:
     for row in mappings.of_plcs:
         if row.station != station:
             continue
-        count = 1 if row.type is ValueType.STRING else row.length
-        for number in range(count):
-            tag = row.tag if count == 1 else f'{row.tag}[{number}]'
+        for number in range(1 if row.type is ValueType.STRING else row.length):
+            tag = name_in(row, number)
             tag += ' (raw)' if row.scaling else ''
             if tag not in (names := tags[str(row.place_of(number))]):
                 names.append(tag)
@@ -316,7 +315,13 @@ def tag_of(mapping: Mapping, number: int, tags: Tags | None) -> str:
     """Return the tag of a value: the tag of its row, or the tags at its address."""
     if tags is None or not is_row(mapping):
         return (tags or {}).get(str(mapping.place_of(number)), '')
-    return printable(mapping.tag if mapping.length == 1 else f'{mapping.tag}[{number}]')
+    return printable(name_in(mapping, number))
+
+
+def name_in(row: Mapping, number: int) -> str:
+    """Return the name of a value of a row of a map: its name in Bits, or the tag of the row."""
+    is_alone = row.length == 1 or row.type is ValueType.STRING
+    return row.tag if is_alone else row.name_of(number) or f'{row.tag}[{number}]'
 
 
 def labels(mapping: Mapping, tags: Tags | None) -> list[str]:

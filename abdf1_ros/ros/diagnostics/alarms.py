@@ -39,6 +39,7 @@ class Bit:
     """
     One bit of an alarm row, and its history.
 
+    - ``name``: its name, or its address
     - ``is_on``: the bit is an alarm now
     - ``since``: clock value (s) of its last change; None if it never changed
     - ``times``: how often the alarm began
@@ -46,7 +47,7 @@ class Bit:
     - ``judged``, ``told``: ``reads`` when it was judged last, and as a status has shown it
     """
 
-    place: str
+    name: str
     is_on: bool = False
     since: float | None = None
     times: int = 0
@@ -85,7 +86,7 @@ class AlarmStatus:
         self.hardware_id = port
         self._alarm = mapping.alarm
         self._point = point
-        self._bits = [Bit(str(mapping.place_of(number))) for number in range(mapping.length)]
+        self._bits = [*map(Bit, mapping.named_places())]
 
     def take(self, values: Values, now: float) -> None:
         """Record the values of a good read."""
@@ -96,7 +97,7 @@ class AlarmStatus:
         state = self._point.freshness(now)
         if not state.is_usable:
             return FRESHNESS_LEVELS[state], f'unknown: its row is {state.value}{self._description}'
-        shown = [f'{bit.place} {bit.text(now)}' for bit in self._bits if bit.judge()]
+        shown = [f'{bit.name} {bit.text(now)}' for bit in self._bits if bit.judge()]
         if not shown:
             return OK, f'no alarm{self._description}'
         return _LEVELS[self._alarm.level], f'{first(shown)}{self._description}'
@@ -106,7 +107,7 @@ class AlarmStatus:
         return f': {self._mapping.description}' if self._mapping.description else ''
 
     def values(self, now: float) -> dict[str, str]:
-        return {bit.place: bit.text(now) for bit in self._bits}
+        return {bit.name: bit.text(now) for bit in self._bits}
 
     def forget(self) -> None:
         """Forget alarms that are over: a status has shown all that were judged."""

@@ -23,10 +23,14 @@ from abdf1_ros.driver.reads.point import Freshness, ReadPoint
 from abdf1_ros.problems import Problem
 from abdf1_ros.ros.diagnostics.load import FullLine, SlowRows
 from abdf1_ros.ros.diagnostics.status import ERROR, Judgement, OK, WARN
+from abdf1_ros.settings.columns import BETWEEN_NAMES
 from abdf1_ros.text import age_text, counted
 
 # Most faults of left-out rows that each status repeats; ``check`` shows them all.
 _MOST_LEFT_OUT = 20
+
+NAMES_OF_BITS = 'names of bits, '
+"""Beginning of the keys of topics whose bits have names; the names have | between them."""
 
 FRESHNESS_LEVELS = {
     Freshness.FRESH: OK, Freshness.LATE: WARN, Freshness.WAITING: WARN,
@@ -46,6 +50,9 @@ class MappingsStatus:
         self.hardware_id = port
         self._points = driver.points
         self._left_out = left_out
+        self._names = {
+            f'{NAMES_OF_BITS}{mapping.topic}': BETWEEN_NAMES.join(mapping.named_places())
+            for mapping in driver.points if mapping.bits}
         self._slow = SlowRows(driver.points.values())
         self._full = FullLine(driver.spent)
 
@@ -83,6 +90,7 @@ class MappingsStatus:
         if more := len(self._left_out) - len(left_out):
             values['left out, more'] = (
                 f'{counted(more, "more fault")}; the log and "check" have them all')
+        values |= self._names
         for point in points:
             tag = point.mapping.tag
             if point.freshness(now) is not Freshness.FRESH:

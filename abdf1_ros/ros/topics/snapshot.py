@@ -101,9 +101,10 @@ def _text(values: Values) -> str:
 
 def _keys(mapping: Mapping, names: MappingType[tuple[int, str], str]) -> Sequence[str]:
     """Return a key for each value; no keys if the row is shown as one text."""
-    if mapping.type is ValueType.STRING or mapping.length > _MOST_KEYS:
+    if mapping.type is ValueType.STRING or mapping.length > _MOST_KEYS and not mapping.bits:
         return ()
     if mapping.length == 1:
         return ('value',)
-    places = map(str, map(mapping.place_of, range(mapping.length)))
-    return [f'value {names.get((mapping.station, place), place)}' for place in places]
+    return [f'value {printable(names.get(place, name))}' for place, name in zip(
+        ((mapping.station, str(mapping.place_of(number))) for number in range(mapping.length)),
+        mapping.named_places(), strict=True)]

@@ -20,6 +20,7 @@ from abdf1_ros.cli.monitor.curves import ASCII, Curve
 from abdf1_ros.cli.monitor.curves import WIDTH as CURVE_WIDTH
 from abdf1_ros.cli.monitor.view import (
     LINK_KEYS,
+    NAMES_OF_BITS,
     NodeView,
     render,
     show,
@@ -93,6 +94,23 @@ def test_value_is_the_last_column_to_go() -> None:
     loads = ShownStatus('link', Style.GOOD, 'OK', {'line load by topic': f'{"x" * 40} 3.1%'})
     assert '3.1%' in line_with('xxx... ', snapshot(
         statuses=[loads], readings=[TopicRow('x' * 40, [1], received=NOW)])).text
+
+
+def test_bits_with_names_are_shown_by_the_names_of_those_that_are_1() -> None:
+    names = ShownStatus('mappings', Style.GOOD, 'OK: of 2', {
+        f'{NAMES_OF_BITS}cell/doors': 'closed | B3:0/1 | drive 3 fault', 'total': '2'})
+
+    def value(*values: int, width: int = WIDTH, topic: str = 'cell/doors') -> str:
+        picture = snapshot(statuses=[names], readings=[TopicRow(topic, values, '', NOW, 1.0)])
+        return line_with(topic[:9], picture, width).text.partition('fresh')[2].strip()
+
+    assert value(1, 0, 1) == 'closed, drive 3 fault'
+    assert value(0, 1, 0) == 'B3:0/1'
+    assert value(0, 0, 0) == 'all 3 are 0'
+    assert value(1, 0, 1, width=50) == 'closed, drive ...'
+    assert value(1, 0) == '1 0'  # a map that has just been read again
+    assert value(1, 0, 1, topic='other') == '1 0 1'
+    assert not any(NAMES_OF_BITS in line for line in lines(snapshot(statuses=[names])))
 
 
 def test_every_part_can_be_found_by_its_first_line() -> None:

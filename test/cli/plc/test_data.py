@@ -117,6 +117,15 @@ def test_values_have_the_tags_of_their_own_addresses() -> None:
         ('N7:0/2', '1'), ('N7:0/3 bit', '0')]
 
 
+def test_bit_of_a_row_has_its_name() -> None:
+    row = make_mapping('B3:0/0', length=3, tag='cell', bits=('closed', '', 'drive 3 fault'))
+    tags = data.tags_of(Rows([row, make_mapping('B3:0/2', tag='drive 3 fault')]), 1)
+    assert [*data.rows(row, [1, 0, 1], data.labels(row, tags))] == [
+        ('B3:0/0 closed', '1'), ('B3:0/1 cell[1]', '0'), ('B3:0/2 drive 3 fault', '1')]
+    bits = make('B3:0/1', Length='2')
+    assert data.labels(bits, tags) == ['B3:0/1 cell[1]', 'B3:0/2 drive 3 fault']
+
+
 @for_all(('address', 'kind', 'texts', 'values'), [
     ('N7:0', '', ['5', '-6', '0x1F', '0b11', '0o17', '007'], [5, -6, 31, 3, 15, 7]),
     ('F8:0', '', ['1.5', '1e3', '2,5'], [1.5, 1000, 2.5]), ('B3:0/0', '', ['1', '0'], [1, 0]),
