@@ -42,6 +42,11 @@ def printable(text: str) -> str:
         character if character.isprintable() else ascii(character)[1:-1] for character in text)
 
 
+def is_head_of_values(line: str) -> bool:
+    """Return True for the head of "plc log", "plc watch --csv" or examples/recorder.py."""
+    return line.startswith(('time,station,address,', 'time,topic,address,'))
+
+
 def value_text(value: float) -> str:
     """Return a value as text, with as many digits as a float32 has."""
     return str(value) if isinstance(value, int) else f'{value:.7g}'

@@ -38,7 +38,7 @@ from abdf1_ros.sniffer.ethernet_ip import chunks_of, CSP, SeenPackets
 from abdf1_ros.sniffer.logs import LogReader
 from abdf1_ros.sniffer.packet_files import is_packet_file, PacketFile
 from abdf1_ros.sniffer.pcapng import LINK_TYPE
-from abdf1_ros.text import counted
+from abdf1_ros.text import counted, is_head_of_values
 
 _BLOCK = 4096
 _GZIP = b'\x1F\x8B'
@@ -50,8 +50,6 @@ _XXD = re.compile(r'(?P<offset>[0-9a-f]{6,}): (?P<bytes>\S.*?)(?:  .*)?', re.IGN
 _HEXDUMP = re.compile(r'(?P<offset>[0-9a-f]{7,})  (?P<bytes>[0-9a-f ]+)(?:\|.*)?', re.IGNORECASE)
 _WORDS = re.compile(r'(?P<offset>[0-9a-f]{7,})(?P<words>(?: +[0-9a-f]{4}){1,8})?', re.IGNORECASE)
 _REPEATED = '*'
-# The head of "plc log" and "plc watch --csv", of any version, and of examples/recorder.py.
-_VALUES = re.compile('time,(station|topic),address,')
 # Bytes that a dump may leave out, all together: hours of the same byte on the fastest line.
 _MOST_LEFT_OUT = 100_000_000
 
@@ -100,7 +98,7 @@ class Recording:
         lines = self._lines()
         first = next(lines, '')
         lines = chain([first], lines)
-        if _VALUES.match(first):
+        if is_head_of_values(first):
             raise Problem(f'{self._name}:1', 'values, not bytes: "plc plot" draws them')
         if is_capture_line(first):
             return read_capture(self._name, lines, self.settings)

@@ -203,7 +203,7 @@ def test_only_what_shows_the_time_of_day_asks_for_it() -> None:
         PACKAGE / module).read_text(encoding='utf-8'))) for module in MODULES}
     assert {module: count for module, count in asked.items() if count} == {
         'cli/monitor/node.py': 1, 'cli/plc/log_file.py': 1, 'cli/plc/reading.py': 1,
-        'cli/plc/verbs/clock.py': 3, 'ports/trace.py': 1, 'readings.py': 2,
+        'cli/plc/verbs/clock.py': 4, 'ports/trace.py': 1, 'readings.py': 2,
         'ros/bridge/session.py': 1, 'ros/process/main.py': 1, 'ros/topics/services.py': 1,
         'ros/topics/snapshot.py': 1, 'ros/topics/writes.py': 1}
 

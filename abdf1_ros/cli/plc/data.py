@@ -45,6 +45,7 @@ from abdf1_ros.pccc.structures import named_runs
 from abdf1_ros.pccc.values import Values, ValueType
 from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings.csv_table import Row
+from abdf1_ros.settings.hints import looks_like_address
 from abdf1_ros.settings.map_row import CellFault, RowReader
 from abdf1_ros.settings.mapping import Command, Mapping
 from abdf1_ros.settings.rows import Rows
@@ -163,8 +164,19 @@ def _in_arguments(fault: CellFault, row: Row) -> Problem:
         if row.get('Command') != Command.READ.value:  # a write: Length is the number of values
             argument = 'VALUE'
     elif fault.column == 'Address':
-        argument += f' "{row.get("Address")}"'
+        address = row.get('Address')
+        argument, text = f'{argument} "{address}"', text + _meant(address)
     return Problem(argument, text)
+
+
+def _meant(address: str) -> str:
+    """Return what a user may have meant by a bad address."""
+    if address.isdigit():
+        return f'; a station is given with --station {address}'
+    parts = re.split('[, ]+', address.strip(', '))
+    if len(parts) > 1 and all(map(looks_like_address, parts)):
+        return f'; several addresses stand apart: {" ".join(parts)}'
+    return ''
 
 
 def length_of(address: str, kind: str | None, texts: Sequence[str]) -> int:
@@ -210,6 +222,8 @@ def remarks_of_write(mapping: Mapping) -> Iterator[str]:
     if mapping.address.file_type is FileType.BINARY and mapping.address.bit is None:
         yield (f'{mapping.address} is a word: this writes its 16 bits; a bit is '
                f'{mapping.address.with_bit(0)}')
+    if mapping.address.file_type is FileType.OUTPUT:
+        yield f'{mapping.address} is an output: this write may move a machine'
     if mapping.fallback is not None:
         yield (f'{named(mapping)} has a Fallback, which only the bridge writes: no '
                'Fallback follows this write')

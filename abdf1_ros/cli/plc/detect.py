@@ -230,7 +230,7 @@ def found_settings(options: argparse.Namespace,
 def only_heard(master: ForeignMaster | None, what: str) -> int:
     """Print the ways to use a line of another master; return the status."""
     complain(what if master is None else (
-        f'{master}: nothing was sent. If the master polls a station N that no PLC has, "plc '
-        '--slave --own-station N" can ask PLCs through it, like a node of Mode Slave; "sniff" '
-        f'shows what the master reads; {what}'))
+        f'{master}: nothing was sent. If the master polls a station N that no PLC has, '
+        '"plc read --slave --own-station N" can ask PLCs through it, like a node of Mode Slave; '
+        f'"sniff" shows what the master reads; {what}'))
     return EXIT_FAILED

@@ -74,8 +74,9 @@ def test_clock_is_set_when_that_is_wanted(
     set_clock(plcs[station - 1], before)
     args = ('clock', str(station), '--set', '--port', port)
     said = call(main, capsys, *args)
-    assert (said.status, said.lines) == (
-        2, [f'would set the clock of station {station} ({WORDS[station]})'.replace('S:', 'S2:')])
+    assert said.status == 2 and re.fullmatch((
+        rf'would set the clock of station {station} \({WORDS[station]}\) to \d{{4}}-\d\d-\d\d '
+        r"\d\d:\d\d:\d\d, this computer's time").replace('S:', 'S2:'), *said.lines)
     assert str(before) in call(main, capsys, 'clock', str(station), '--port', port).lines[0]
     said = call(main, capsys, *args, '--yes')
     assert said.status == 0, said

@@ -223,6 +223,7 @@ def test_signal_ends_it(tmp_path: Path) -> None:
     (('--port', '/dev/x', 'read', 'N7:0'),
      'options come after the command, as in "plc read ... --port ..."'),
     (('raed', 'N7:0'), '"raed" is not a command; did you mean read?'),
+    (('READ', 'N7:0'), '"READ" is not a command; did you mean read?'),
     (('init', '/dev/x'), 'unrecognized arguments: /dev/x; did you mean --port /dev/x?'),
     (('read', 'N7:0', '--len', '5'), 'unrecognized arguments: --len 5; did you mean --length?'),
     (('write', 'N7:0', '5', '--force'), 'unrecognized arguments: --force\n'),

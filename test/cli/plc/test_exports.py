@@ -40,6 +40,7 @@ from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import load_network
 import pytest
 from support.cases import for_all
+from support.commands import call, Output, Said
 from support.mappings import cell_of
 
 KEPSERVER = (
@@ -134,6 +135,16 @@ def test_tag_that_cannot_be_used_is_left_out_and_stays_as_a_comment(
     tag = row.split(',')[0].strip('"')
     assert left_out == [f'3: {tag}: {expected}']
     assert f'# line 3: {row.split(",")[0].strip(chr(34))},' in (tmp_path / 'map.csv').read_text()
+
+
+@pytest.mark.parametrize('head', [
+    'time,station,address,tag,value,reason', 'time,topic,address,values'])
+def test_log_of_values_is_no_list(tmp_path: Path, capsys: Output, head: str) -> None:
+    path = tmp_path / 'shift.csv'
+    path.write_text(f'{head}\n2026-03-01T14:05:09.250+01:00,1,N7:0,"speed",1200,\n')
+    said = call(main, capsys, 'import', str(path), '--into', str(tmp_path))
+    assert said == Said(
+        2, '', f'plc: {path}:1: values, not a list of tags: "plc plot" draws them\n')
 
 
 @for_all('ends', [

@@ -57,6 +57,23 @@ def test_read_shows_address_and_values(
     assert (said.status, said.lines, said.err) == (0, lines, '')
 
 
+@pytest.mark.parametrize(('args', 'hint'), [
+    (('2', 'N7:0'), '; a station is given with --station 2'),
+    (('N7:0', '2'), '; a station is given with --station 2'),
+    (('N7:0,N7:1',), '; several addresses stand apart: N7:0 N7:1'),
+    (('N7:0 B3:0/1',), '; several addresses stand apart: N7:0 B3:0/1'),
+    (('N7:0,x',), ''), (('--csv', 'N7:0'), 'plc read: error: "plc watch --csv --count 1" prints '
+                        'values for programs'),
+    (('N7:0', '--json'), 'plc read: error: "plc log --format jsonl --count 1" prints values for '
+     'programs')])
+def test_mistaken_words_lead_to_the_right_ones(
+        capsys: Output, args: tuple[str, ...], hint: str) -> None:
+    said = call(main, capsys, 'read', *args, '--port', '/dev/ttyNOWHERE',
+                '--plc-type', 'SLC')  # of a PLC-2 a number is an address
+    assert said.status == 2 and hint in said.err
+    assert bool(hint) == ('; a station' in said.err or 'apart' in said.err or '"plc ' in said.err)
+
+
 def test_read_shows_rows_with_their_addresses(plc: Plc) -> None:
     said = plc('read', 'N7:9', 'B3:0/15', '--length', '18', '--station', '2')
     assert [line.split()[0] for line in said.lines] == ['N7:9', 'N7:19', 'B3:0/15', 'B3:1/15']

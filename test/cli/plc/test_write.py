@@ -78,6 +78,13 @@ def test_write_over_a_fallback_is_told(plc: Plc, tmp_path: Path) -> None:
         'follows this write\n')
 
 
+def test_write_to_an_output_is_told(plc: Plc) -> None:
+    for args in ((), ('--yes',)):
+        said = plc('write', 'O:2.0/3', '0', '--station', '2', *args)
+        assert said.err.splitlines()[0] == (
+            'plc: O:2.0/3 is an output: this write may move a machine')
+
+
 def test_write_to_an_input_is_told(plc: Plc) -> None:
     said = plc('write', 'I:1.0', '5', '--station', '2')
     assert said.err.splitlines()[0] == (

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 import csv
 from dataclasses import dataclass, field, replace
 import io
@@ -34,8 +35,9 @@ from abdf1_ros.settings.map_file import MOST_ROWS
 from abdf1_ros.settings.map_row import RowReader
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.names import sanitise
-from abdf1_ros.text import printable, shown
+from abdf1_ros.text import is_head_of_values, printable, shown
 
+_LONGEST_HEAD = 200  # characters
 _COLUMNS = (*NEEDED, 'Length', 'Type', 'Period', 'Scale', 'Offset', 'Min', 'Max', 'Description')
 
 
@@ -69,6 +71,7 @@ def import_map(path: str, wanted: Wanted) -> Import:
     Raises ConfigurationError if the file cannot be read, has no known form, or has rows of PLCs
     whose stations are not known.
     """
+    _refuse_values(path)
     sheet = read_sheet(path)
     sheet = replace(sheet, records=records_of(sheet.text) or sheet.records)
     table = table_of(sheet, wanted)
@@ -95,6 +98,14 @@ def import_map(path: str, wanted: Wanted) -> Import:
                 f'the rows up to here make more than {MOST_ROWS} rows of a map, the most that it '
                 'can have; divide the file'))])
     return result
+
+
+def _refuse_values(path: str) -> None:
+    """Raise ConfigurationError for a log of values, which may be long."""
+    with suppress(OSError), open(path, encoding='utf-8-sig', errors='replace') as file:
+        if is_head_of_values(file.readline(_LONGEST_HEAD)):
+            raise ConfigurationError([Problem(
+                f'{path}:1', 'values, not a list of tags: "plc plot" draws them')])
 
 
 _Heads = dict[str, str]

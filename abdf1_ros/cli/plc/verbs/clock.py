@@ -62,7 +62,8 @@ def _clock(options: argparse.Namespace, session: Session) -> int:
             print(f'station {options.station}: {told(*clock.read())}')
             return 0
         if not options.yes and not is_wanted(
-                f'set the clock of station {options.station} ({clock.address})'):
+                f'set the clock of station {options.station} ({clock.address}) to '
+                f"{datetime.now():%Y-%m-%d %H:%M:%S}, this computer's time"):
             complain('nothing was written; --yes writes')
             return EXIT_USAGE
         if status := clock.write():

@@ -31,9 +31,19 @@ from abdf1_ros.cli.plc.targets import Targets, to_read
 from abdf1_ros.errors import Abdf1Error
 
 
+class _Elsewhere(argparse.Action):
+    """Name the verb that has an option."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *args: object) -> None:
+        parser.error(f'"plc {self.const}" prints values for programs')
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments."""
     add_addresses(parser)
+    for name, words in (('--csv', 'watch --csv --count 1'),
+                        ('--json', 'log --format jsonl --count 1')):
+        parser.add_argument(name, action=_Elsewhere, const=words, nargs=0, help=argparse.SUPPRESS)
 
 
 def run(options: argparse.Namespace) -> int:

@@ -67,7 +67,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     assert isinstance(address, _AddressAction)
     address.values = parser.add_argument(
         'values', metavar='VALUE', nargs='+', action='extend',
-        help='numbers, also as 0x or 0b; 0 or 1 for bits; one text for a string')
+        help='numbers, also as 0x or 0b; 0 or 1 for bits; one text for a string; '
+             'N7:10=5 stands for ADDRESS and VALUE')
     parser.add_argument('--map', metavar='FILE', type=expanded,
                         help='a map CSV: ADDRESS is then the tag of a row; Scale, Min, Max and '
                              'Station of the row apply')
