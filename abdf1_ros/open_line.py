@@ -80,11 +80,13 @@ class OpenedPort:
     A port that is open: a call returns it, and each later call opens it again.
 
     So a port that does not exist raises OSError here, and not in the thread of the link. If
-    another thread of this program has the port, its ``close`` is waited for.
+    another thread of this program has the port, its ``close`` is waited for. ``around`` may put a
+    port around it.
     """
 
-    def __init__(self, settings: PortSettings) -> None:
-        self._settings = settings
+    def __init__(self, settings: PortSettings,
+                 around: Callable[[Port], Port] = lambda port: port) -> None:
+        self._settings, self._around = settings, around
         line = line_of(settings.name)
         while True:
             holder = _ours.get(line)  # before the attempt, so that no end is missed
@@ -100,7 +102,7 @@ class OpenedPort:
                 raise
 
     def __call__(self) -> Port:
-        return self._ports.pop() if self._ports else open_port(self._settings)
+        return self._around(self._ports.pop() if self._ports else open_port(self._settings))
 
     def close(self) -> None:
         """Close the port if no call has taken it."""
@@ -196,14 +198,15 @@ class OpenLine(_Closes):
     ``stations`` has the state of each station, and the gateway if the station is behind one. An
     inactive station gets only one try for each request until it answers. To a PLC that asks for
     our identity we report a ``plc_type``. ``counters`` counts the events of the whole line. All
-    bytes are written to the file ``trace``, for ``sniff``. Raises OSError if the port cannot be
-    opened, and ConfigurationError if the file cannot be written or the mode only listens.
+    bytes are written to the file ``trace``, for ``sniff``; ``around`` may put a port around ours.
+    Raises OSError if the port cannot be opened, and ConfigurationError if the file cannot be
+    written or the mode only listens.
     """
 
     def __init__(self, mode: LineMode, line: LinkSettings, port: PortSettings,
                  stations: ActiveStationList | None = None, plc_type: PlcType = PlcType.PLC5,
-                 trace: str | None = None,
-                 logger: logging.Logger = LOG) -> None:
+                 trace: str | None = None, logger: logging.Logger = LOG,
+                 around: Callable[[Port], Port] = lambda port: port) -> None:
         if mode.only_listens:
             raise ConfigurationError([Problem('Mode', (
                 f'in Mode {mode.name} nothing may be sent on this line; "plc log" has its '
@@ -217,7 +220,7 @@ class OpenLine(_Closes):
                                   self._told, may_store='://' in port.name)
         self.counters = self._requests.counters
         self._trace: Trace | None = None
-        self._port = OpenedPort(port)
+        self._port = OpenedPort(port, around)
         port_of: Callable[[], Port] = self._port
         if trace is not None:
             port_of, self._trace = traced(

@@ -51,6 +51,7 @@ PARTS: dict[tuple[str, str], Callable[[], str]] = {
     ('docs/protocol/half_duplex.md', 'rules'): partial(
         conversations.rules, 'Master', 'Standard polling', 'Slave'),
     ('docs/sharing.md', 'rights'): tables.rights,
+    ('docs/troubleshooting.md', 'causes'): tables.causes,
     ('docs/protocol/addresses.md', 'file-codes'): tables.file_codes,
     ('docs/protocol/statuses.md', 'statuses'): tables.statuses,
     ('docs/protocol/commands.md', 'commands'): tables.commands,

@@ -80,6 +80,8 @@ ROOMS = (
          ('errors', 'pccc.fields')),
     Room(('sniffer',), 'recorded bytes, and traffic in words',
          ('problems', 'text', 'numbers', 'df1', 'pccc', 'cip')),
+    Room(('diagnosis',), 'from what a line has shown to one cause and one next step',
+         ('text', 'df1', 'sniffer')),
     Room(('settings',), 'both CSV files',
          ('errors', 'messages', 'problems', 'numbers', 'text', 'line_names', 'df1', 'pccc')),
     Room(('plan',), 'the read plan: blocks, their cost on the line, bounds and remarks',

@@ -24,6 +24,7 @@ from typing import Any
 
 from abdf1_ros.counters import numbered
 from abdf1_ros.df1.frames import Code
+from abdf1_ros.diagnosis.causes import diagnose, RULES
 from abdf1_ros.driver.guest_rules import right_for
 from abdf1_ros.messages import Message, Severity
 from abdf1_ros.numbers import ValueKind
@@ -195,6 +196,13 @@ def messages(severity: Severity) -> str:
          f'{entry.name}: {_code(entry.template)}',
          _linked(MESSAGES[entry].cause), _linked(MESSAGES[entry].cure))
         for entry in Message if entry.severity is severity))
+
+
+def causes() -> str:
+    """Return the causes of a missing answer, each with the texts for its example."""
+    return table(('seen', 'cause', 'next', '`plc` asks before'), (
+        (rule.seen, found.cause, found.step, rule.asks.value if rule.asks else '')
+        for rule in RULES for found in (diagnose(rule.example),)))
 
 
 def counters() -> str:

@@ -17,15 +17,19 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Mapping as MappingType
 from contextlib import contextmanager, suppress
+from functools import partial
+from pathlib import Path
 import sys
 
 from abdf1_ros.cli.plc import data, presence
+from abdf1_ros.cli.plc.inquiry import conclude, is_beside_master
 from abdf1_ros.cli.plc.line import apart_from_target, MODES, network_of
 from abdf1_ros.cli.plc.options import DEFAULT_STATION
 from abdf1_ros.cli.plc.session import complain, Session
-from abdf1_ros.cli.plc.targets import Targets
+from abdf1_ros.cli.plc.targets import routes_of, Targets
 from abdf1_ros.cli.terminal import drop_output, EXIT_FAILED
 from abdf1_ros.errors import Abdf1Error, LinkError, PortLost, RemoteError
 from abdf1_ros.open_line import kind_of
@@ -35,6 +39,7 @@ from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.status import is_address_fault
 from abdf1_ros.problems import ConfigurationError, Problem
+from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 
@@ -46,10 +51,13 @@ def ask(options: argparse.Namespace, work: Callable[[argparse.Namespace, Session
 
     - ``targets``: the rows and addresses that ``work`` reads or writes; a row of a map names its
       station.
-    - ``writes``: if True, the user has to name the station on a line with several stations.
+    - ``writes``: if True, the user has to name the station on a line with several stations, and
+      nothing is sent beside another master.
     - ``record``: a file for all bytes of the line.
     """
     network = _line(options, targets, writes)
+    if writes and is_beside_master(network):
+        return EXIT_FAILED
     routes = targets.routes if targets else None
     with Session(network, via=options.via, record=record, routes=routes) as session:
         if options.via is not None and (
@@ -57,12 +65,19 @@ def ask(options: argparse.Namespace, work: Callable[[argparse.Namespace, Session
             complain(f'stations {options.station} and {options.via} are both "{who}": if '
                      f'{options.via} is not a gateway, it answers itself')
         try:
-            return work(options, session)
+            status = work(options, session)
         except Abdf1Error as error:
-            return failed(options, session, error)
-        finally:
-            if session.is_silent:
-                complain(presence.traffic(session.counters, session.stray))
+            status = failed(options, session, error)
+    conclude(session, partial(_neighbours, options, routes or {}))
+    return status
+
+
+def _neighbours(options: argparse.Namespace, routes: MappingType[int, int]) -> Sequence[int]:
+    """Return stations that are on the line itself: of the map, or of map.csv beside net.csv."""
+    if not routes and options.net:
+        with suppress(ConfigurationError):
+            routes = routes_of(load_mappings(str(Path(options.net).with_name('map.csv')))[0])
+    return sorted(station for station, gateway in routes.items() if station == gateway)
 
 
 def mappings_of(options: argparse.Namespace, session: Session,
@@ -94,8 +109,8 @@ def failed(options: argparse.Namespace, session: Session, error: Abdf1Error, pla
     complain(f'{place and f"{place} of "}station {station}: {error}')
     if isinstance(error, RemoteError):
         check_type(options, session, station)
-    _advise(session, presence.hint(session, station, error))
-    session.is_silent |= isinstance(error, LinkError)
+    if isinstance(error, LinkError) and session.silent is None:
+        session.silent = station
     if options.is_assumed and isinstance(error, LinkError):
         _advise(session, f'no station was given, so {station} was asked; "plc scan" lists the '
                          'stations that answer')

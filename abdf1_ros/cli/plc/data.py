@@ -30,7 +30,7 @@ from abdf1_ros.cli.plc.session import complain, Session
 from abdf1_ros.cli.terminal import EXIT_FAILED, EXIT_UNKNOWN
 from abdf1_ros.driver.write import Outcome, show, Write, WriteResult
 from abdf1_ros.driver.writes.packets import carry_out
-from abdf1_ros.errors import Abdf1Error, FormatError, PortLost, RemoteError
+from abdf1_ros.errors import Abdf1Error, FormatError, LinkError, PortLost, RemoteError
 from abdf1_ros.numbers import decimal_number, two_readings, whole_number
 from abdf1_ros.open_line import Pending
 from abdf1_ros.pccc import steps
@@ -270,7 +270,10 @@ class Writing:
         try:
             # Inside the try block: an interrupt may come while the command is on the line.
             session.start(self.mapping.station, carry_out(self._write), pending)
-            return session.wait(pending)
+            result = session.wait(pending)
+            if isinstance(result.error, LinkError) and not isinstance(result.error, PortLost):
+                session.silent = self.mapping.station
+            return result
         except (KeyboardInterrupt, PortLost) as error:
             session.close()
             if pending.is_done and pending.error is None:

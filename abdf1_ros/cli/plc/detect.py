@@ -17,8 +17,7 @@
 from __future__ import annotations
 
 import argparse
-from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 import time
@@ -30,6 +29,8 @@ from abdf1_ros.cli.plc.session import complain, Session
 from abdf1_ros.cli.terminal import EXIT_FAILED, Progress
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.echo import COMES_BACK
+from abdf1_ros.diagnosis.causes import diagnose
+from abdf1_ros.diagnosis.traces import Traces
 from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings.network import Network
 
@@ -67,10 +68,6 @@ ENQ_TIME = 5.0
 ROUNDS = 2
 """Number of attempts with the same settings: a lost frame does not prove absence."""
 
-_ALL_TRIED_IN_VAIN = (
-    'not one character came: cable, port, power? Or a station that was not asked (--stations; a '
-    'PLC-5 shows its own in octal)')
-
 
 @dataclass(frozen=True, slots=True)
 class Found:
@@ -85,33 +82,27 @@ class Search:
     Try settings on the port of ``network``, in half duplex with each of ``stations``.
 
     ``show`` gets a text about the settings being tried. ``echoes`` is True if our bytes came back:
-    then there cannot be a full-duplex PLC. ``acknowledged`` names the settings of a full-duplex
-    port that acknowledges commands, if no station replies; empty if there is none.
+    then there cannot be a full-duplex PLC. ``traces`` has what each setting has shown. With
+    ``is_acknowledged`` a full-duplex port acknowledges commands, and no station replies.
     """
 
     def __init__(self, network: Network, stations: Sequence[int],
                  show: Callable[[str], None] = lambda text: None) -> None:
         self.echoes = False
-        self.acknowledged = ''
+        self.traces: dict[LineSettings, Traces] = {}
         self._network = replace(network, nak_retries=0, enq_retries=1,
                                 cmd_timeout=max(500, network.timeout))
         self._stations = stations
         self._show = show
-        self._characters = Counter[LineSettings]()  # received without an answer
+        self.is_acknowledged = False
         self._lacks_acks = False  # replies came, but no ACK
-
-    @property
-    def traces(self) -> list[str]:
-        """Return texts about settings with which characters came, but no answer."""
-        return [f'{settings}: {count} characters came'
-                for settings, count in self._characters.items()]
 
     def run(self, bauds: Sequence[int], modes: Sequence[str] = ('Peer', 'Master'),
             checks: Sequence[str] = CHECKS) -> Found | None:
         """Return the first settings that work, or None; raises OSError, PortLost."""
         for _, baud, mode in product(range(ROUNDS), bauds, modes):
             found = self._try(baud, mode, checks)
-            if found is None and self.acknowledged and mode == modes[-1]:
+            if found is None and self.is_acknowledged and mode == modes[-1]:
                 return None  # with another speed nothing can come
             if found is None:
                 continue
@@ -141,7 +132,7 @@ class Search:
                 elif presence.is_there:
                     heard.append(presence.station)
                 elif presence.is_only_acknowledged:
-                    acknowledged.append(presence.evidence)
+                    acknowledged.append(presence.station)
                 if own is None and (other := presence.other_number) is not None:
                     break
             if gateway:
@@ -149,7 +140,7 @@ class Search:
             if other is not None:
                 return self._try(baud, mode, [check], other)
             if len(acknowledged) == len(stations):
-                self.acknowledged = f'{settings}: {acknowledged[0]}'
+                self.is_acknowledged = True
                 return None
             if mode == MODES['half'] and not heard:
                 return None  # a poll is the same with both checks
@@ -171,15 +162,17 @@ class Search:
                 presence = look_at(session, station)
                 if session.echoes:
                     self.echoes = True
-                    self._characters.clear()  # our own bytes that came back late
+                    self.traces.clear()  # our own bytes that came back late
                     if settings.mode == MODES['full']:
                         return
                 if presence.takes_commands and not understands(session, station):
                     presence = replace(presence, takes_commands=False)
                 self._lacks_acks = not session.counters.acks_received
                 yield presence
-            if session.counters.chars_received and not self.echoes:
-                self._characters[settings] += session.counters.chars_received
+            has_news = settings not in self.traces or session.counters.chars_received
+            if has_news and not self.echoes:
+                heard = (number for number in stations if session.stations[number].last_heard)
+                self.traces[settings] = session.traces(next(heard, stations[0]))
 
     def _is_radio(self, settings: LineSettings, station: int) -> bool:
         """Return True if replies come without ACK, NAK or ENQ, although we send no ACK."""
@@ -212,19 +205,40 @@ def found_settings(options: argparse.Namespace,
     progress.clear()
     if search.echoes:
         complain(COMES_BACK)
-    if found is None and search.acknowledged:
-        complain(search.acknowledged)
-    elif found is None:
-        complain(f'nothing answers with any of these settings, tried {ROUNDS} times')
-        for trace in search.traces or [_ALL_TRIED_IN_VAIN] * (not search.echoes):
-            complain(trace)
-        kept = [option for option, value in (
+    if found is None:
+        if not search.is_acknowledged:
+            complain(f'nothing answers with any of these settings, tried {ROUNDS} times')
+        for text in [] if search.echoes else conclusion(search.traces):
+            complain(text)
+        kept = [] if search.is_acknowledged else [option for option, value in (
             ('--duplex', options.duplex), ('--baud', options.baud), ('--check', options.check))
             if value]
         if kept:
             complain(f'{" and ".join(kept)}: no other value was tried; leave the option out to '
                      'try all')
     return found
+
+
+def conclusion(traces: Mapping[LineSettings, Traces]) -> Iterator[str]:
+    """Yield the cause that the settings show together, and the first bytes if they are no DF1."""
+    noisy = sum(seen.characters > 0 for seen in traces.values())
+    found = {settings: diagnose(replace(
+        seen, settings=len(traces), noisy=noisy,
+        takes_other_check=_takes_other_check(traces, settings)))
+        for settings, seen in traces.items()}
+    settings, best = min(found.items(), key=lambda entry: entry[1].rank)
+    yield str(best) if best.rule.is_of_all else f'{settings}: {best}'
+    if best.traces.characters and not best.traces.is_df1:
+        yield f'{settings}: first bytes {best.traces.first_text}'
+
+
+def _takes_other_check(traces: Mapping[LineSettings, Traces],
+                       settings: LineSettings) -> bool | None:
+    """Return False if commands with the other check were refused in the same way."""
+    other = traces.get(replace(settings, check=traces[settings].other_check))
+    is_refused = other is not None and not other.acks and (
+        other.naks + other.polls_answered > 0)
+    return False if is_refused else traces[settings].takes_other_check
 
 
 def only_heard(master: ForeignMaster | None, what: str) -> int:

@@ -21,9 +21,9 @@ from collections.abc import Iterator, Sequence
 from datetime import datetime
 from functools import partial
 
-from abdf1_ros.cli.plc import presence
 from abdf1_ros.cli.plc.asking import ask, mappings_of
 from abdf1_ros.cli.plc.data import tag_of, Tags
+from abdf1_ros.cli.plc.inquiry import concluded
 from abdf1_ros.cli.plc.line import network_of
 from abdf1_ros.cli.plc.log_file import (
     ANSWERS_AGAIN,
@@ -163,7 +163,4 @@ def _log(options: argparse.Namespace, network: Network, mappings: Sequence[Mappi
          targets: Targets, output: LogFile | LogOutput) -> int:
     log = ValueLog(network, mappings, options.period, output, targets.tags,
                    options.record)
-    failed = log.run(options.count)
-    if failed and not network.line_mode.only_listens:
-        complain(presence.traffic(log.counters))
-    return EXIT_FAILED if failed else 0
+    return concluded(log, log.run(options.count))

@@ -26,17 +26,16 @@ from abdf1_ros.cli.plc.line import free_station
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.cli.terminal import colour, GREEN, RED, YELLOW
 from abdf1_ros.counters import Counters
-from abdf1_ros.df1.echo import COMES_BACK
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.packet import is_local_status
 from abdf1_ros.df1.stations import MOST_IN_VAIN
+from abdf1_ros.diagnosis.traces import Traces
 from abdf1_ros.driver.evidence import Evidence, evidence_of
 from abdf1_ros.errors import (
     Abdf1Error,
     CommandTimeout,
     FormatError,
     LinkError,
-    PortLost,
     RemoteError,
     StationInactive,
 )
@@ -59,10 +58,6 @@ _SLOTS_TRIED = 8
 _MOST_ROUNDS = 4
 
 _ECHO = bytes(range(1, 17))
-
-# A half-duplex station with a wrong setting is silent, so settings come first in the text.
-SILENCE = ('not one character came: station (a PLC-5 shows its own in octal), check or duplex '
-           'wrong? Then cable, port, power, baud rate and parity.')
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,7 +157,7 @@ def _basic_read() -> Steps[None]:
 
 def scan(network: Network, stations: Sequence[int], via: int | None = None,
          show: Callable[[str], None] = lambda text: None,
-         complain: Callable[[str], None] = lambda text: None, *,
+         ended: Callable[[Session], None] = lambda session: None, *,
          asks_all: bool = True) -> Iterator[Presence]:
     """
     Yield the presence of every station, ``via`` a gateway; raises OSError and PortLost.
@@ -171,14 +166,15 @@ def scan(network: Network, stations: Sequence[int], via: int | None = None,
     which only an ACK came.
 
     Silent stations are asked again at the end: a lost frame does not prove absence. ``show`` gets
-    a text about the present station, ``complain`` the traffic if stations stay silent on a line
-    that loses frames. On a line with station numbers we use a free number.
+    a text about the present station. ``ended`` gets the session at the end. Its ``silent`` is a
+    station that answers polls only; or a silent station, if there is no other or if the line loses
+    frames. On a line with station numbers we use a free number.
     """
     if not network.line_mode.has_one_plc and not network.line_mode.is_polled:
         network = replace(network, station=free_station(network.station, {*stations, via}))
     with Session(network, absent=stations, via=via) as session:
         left: Sequence[int] = stations
-        counters, has_lost, in_vain = session.counters, False, 0
+        counters, has_lost, is_found, in_vain = session.counters, False, False, 0
         for asked in range(1, _MOST_ROUNDS + 1):
             damaged, loses = counters.damaged_frames, False
             silent = []
@@ -190,6 +186,7 @@ def scan(network: Network, stations: Sequence[int], via: int | None = None,
                 is_enough = presence.is_only_acknowledged and counters.damaged_frames == damaged
                 in_vain = in_vain + 1 if is_enough and network.line_mode.has_one_plc else 0
                 if presence.is_settled or is_enough:
+                    is_found |= presence.is_there
                     yield presence
                     if in_vain >= MOST_IN_VAIN and not asks_all:
                         return
@@ -203,8 +200,10 @@ def scan(network: Network, stations: Sequence[int], via: int | None = None,
             if not left or asked == _MOST_ROUNDS or asked > 1 and not loses:
                 break
         yield from silent
-        if silent and has_lost:
-            complain(traffic(counters, session.stray))
+        there = [presence.station for presence in silent if presence.is_there]
+        if there or has_lost or not is_found:
+            session.silent = next(iter((*there, *(presence.station for presence in silent))), None)
+    ended(session)
 
 
 def again(asked: int) -> str:
@@ -298,25 +297,11 @@ def describe(presence: Presence) -> list[str]:
         for name, text, code in lines if text)]
 
 
-def hint(session: Session, station: int, error: Abdf1Error) -> str:
-    """Return advice after an error of a station; empty if there is none."""
-    if not isinstance(error, LinkError) or isinstance(error, PortLost):
-        return ''
-    if session.echoes:
-        return COMES_BACK
-    if shown := str(evidence_of(session.network.line_mode, session.stations, station)):
-        return shown
-    received, network = session.counters.chars_received, session.network
-    if network.line_mode.is_polled and not session.counters.polls_received:
-        return (f'no master has polled us, station {network.station}: "plc detect" lists the '
-                'stations that the master polls; give one of them with --own-station')
-    if session.counters.messages_received + session.counters.acks_received:
-        return ''
-    cause = SILENCE if not received else (
-        f'{received} characters came, but no answer that makes sense: baud rate, parity, check, '
-        'duplex, or another master?')
-    return (f'asked with {network.baud} baud, parity {network.parity}, {network.duplex.value}, '
-            f'{network.error_code}: {cause} "plc detect" tries other settings')
+def facts(network: Network, counters: Counters, stray: str, traces: Traces) -> str:
+    """Return settings, numbers of frames, and the first bytes if no DF1 came, as text."""
+    first = '' if traces.is_df1 or not traces.first else f'; first bytes {traces.first_text}'
+    return (f'{network.baud} baud, parity {network.parity}, {network.duplex.value}, '
+            f'{network.error_code}; {traffic(counters, stray)}{first}')
 
 
 def traffic(counters: Counters, stray: str = '') -> str:

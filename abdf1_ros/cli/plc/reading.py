@@ -23,9 +23,10 @@ from functools import partial
 import random
 from typing import NamedTuple
 
-from abdf1_ros.cli.plc.session import opened
+from abdf1_ros.cli.plc.session import opened, Witness
 from abdf1_ros.cli.terminal import tell
 from abdf1_ros.df1.stations import Station
+from abdf1_ros.diagnosis.traces import Traces
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.reads.point import Freshness
 from abdf1_ros.driver.settings import DriverSettings
@@ -72,8 +73,9 @@ class RepeatedReads:
     ``processor_period`` is the time (s) between two questions for the mode of a PLC, 0 for none.
     All bytes go into the capture ``record``.
 
-    This class is the driver's ``Listener``; ``counters`` are the counters of the line. Raises
-    OSError if the port cannot be opened.
+    This class is the driver's ``Listener``; ``counters`` are the counters of the line. After the
+    end ``silent`` is a station whose last command had no reply, None for none and after Ctrl-C.
+    Raises OSError if the port cannot be opened.
     """
 
     def __init__(self, network: Network, mappings: Sequence[Mapping], period: float,
@@ -85,8 +87,12 @@ class RepeatedReads:
             processor_period=processor_period)
         self._driver = Driver(network, mappings, settings, self)
         self._points = [self._driver.points[mapping] for mapping in mappings]
+        self.network, self.stations = network, self._driver.stations
         self.counters = self._driver.counters
-        self._port, self._trace = opened(network), None
+        self.silent: int | None = None
+        self.stray, self._echoes = '', False
+        self.witness = Witness()
+        self._port, self._trace = opened(network, self.witness.around), None
         port: Callable[[], Port] = self._port
         if record is not None:
             port, self._trace = traced(record, PortSettings.of(network), network.error_code,
@@ -115,17 +121,31 @@ class RepeatedReads:
                 self._has_news.take()
                 self._show_news()
             self._show_news()
+            self.silent = self._first_silent()
         except KeyboardInterrupt:
             self._show_news()
         finally:
             # Count before the stop, because the end of the line causes more errors.
             failed = sum(point.error is not None for point in self._points)
+            self._echoes = self._driver.machine.echoes
             self._link.stop()
             self._port.close()  # the thread may not have come to it
             self._has_news.close()
             if self._trace is not None:
                 self._trace.close()
         return failed
+
+    def traces(self, station: int) -> Traces:
+        """Return what the line has shown while a station was asked."""
+        return self.witness.traces(self.network, self.stations, station, echoes=self._echoes)
+
+    def _first_silent(self) -> int | None:
+        """Return the first station whose last command had no reply, though the port is open."""
+        if self._is_listening or not self._link.state.is_open:
+            return None
+        asked = (self.stations[point.mapping.station] for point in self._points)
+        return next((station.number for station in asked
+                     if not station.active or station.unanswered), None)
 
     def begin(self) -> None:
         """Do what comes before the first result."""

@@ -45,3 +45,9 @@ def line(simulator: Process, files: Files) -> str:
 @pytest.fixture
 def plc(line: str, capsys: Output) -> Plc:
     return lambda command, *args: call(main, capsys, command, '--port', line, *PATIENT, *args)
+
+
+@pytest.fixture(autouse=True)
+def listening_is_short(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let commands that first listen for another master do so for a moment."""
+    monkeypatch.setattr('abdf1_ros.cli.plc.overhear.LISTENED', 0.05)

@@ -22,7 +22,7 @@ from unittest.mock import MagicMock, Mock
 from abdf1_ros import settings
 from abdf1_ros.cli.plc import detect
 from abdf1_ros.cli.plc.command import main
-from abdf1_ros.cli.plc.detect import BAUD_RATES, LineSettings, Search
+from abdf1_ros.cli.plc.detect import BAUD_RATES, conclusion, LineSettings, Search
 from abdf1_ros.cli.plc.init import net_csv
 from abdf1_ros.cli.plc.line import network_of
 from abdf1_ros.cli.plc.parser import make_parser
@@ -36,6 +36,7 @@ from abdf1_ros.df1.radio import RadioNode
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.diagnosis.traces import Traces
 from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 import pytest
@@ -92,7 +93,7 @@ def test_everything_is_tried_on_a_silent_line(tmp_path: Path) -> None:
                  'full duplex, BCC, station 3', 'full duplex, BCC, station 0',
                  *(f'half duplex, CRC, station {number}' for number in (0, 3, 1))]
     assert trying == 2 * [f'{baud} baud, {text}' for baud in (19200, 9600) for text in one_speed]
-    assert search.traces == []
+    assert {seen.characters for seen in search.traces.values()} == {0}
 
 
 @pytest.mark.parametrize('duplex, check, mode, tried', [
@@ -186,7 +187,12 @@ def test_full_duplex_port_with_another_station_is_heard_all_the_same(tmp_path: P
     with plc_on(tmp_path / 'line', 'CRC', Duplex.FULL, Particular) as network:
         search = Search(network, [5])
         assert search.run([9600], ['Peer'], ['CRC']) is None
-    assert search.traces == ['9600 baud, full duplex, CRC: 4 characters came']  # NAKs to ENQs
+    seen, = search.traces.values()
+    assert (seen.characters, seen.enquiries, seen.naks) == (2, 1, 0)
+    assert [*conclusion(search.traces)] == [
+        '9600 baud, full duplex, CRC: a full-duplex port answers, but takes no command for '
+        'station 5. Next: "plc scan 0-63 --peer" shows which stations reply; then try the other '
+        'Error_Code, BCC']
 
 
 def test_characters_of_before_an_echo_was_seen_are_no_trace(
@@ -195,6 +201,7 @@ def test_characters_of_before_an_echo_was_seen_are_no_trace(
         """Characters come back too late to be known, at 19200 baud in time."""
 
         counters = Counters()
+        stations = ActiveStationList()
 
         def __init__(self, network: Network, absent: object = ()) -> None:
             self.echoes = network.baud == 19200
@@ -208,6 +215,9 @@ def test_characters_of_before_an_echo_was_seen_are_no_trace(
         def __exit__(self, *exception: object) -> None:
             """Close nothing."""
 
+        def traces(self, station: int) -> Traces:
+            return Traces(characters=4)
+
     absent = Presence(1, 0.0, None, None, is_there=False, takes_commands=True)  # ACKs, no reply
     monkeypatch.setattr(detect, 'Session', EchoedSession)
     monkeypatch.setattr(detect, 'look_at', lambda session, station: absent)
@@ -217,7 +227,7 @@ def test_characters_of_before_an_echo_was_seen_are_no_trace(
     assert search.run([9600]) is None
     assert len(search.traces) == 3
     assert search.run([9600, 19200]) is None
-    assert search.traces == []
+    assert search.traces == {}
 
 
 def test_only_options_and_urls_keep_a_search_from_trying_all(
@@ -320,7 +330,8 @@ def test_port_that_only_acknowledges_has_these_settings_and_another_station(
         assert said.err.splitlines()[-1] == (
             'plc: 19200 baud, full duplex, CRC: commands to station 1 are acknowledged, and no '
             'reply comes: is the number right? An SLC with passthru, or a gateway, acknowledges '
-            'commands for all stations; "plc scan 0-63" shows which stations reply')
+            'commands for all stations. Next: "plc scan 0-63" shows which stations reply; if it '
+            'is the PLC itself, raise Cmd_Timeout')
         assert 'nothing answers' not in said.err
         assert main(['detect', '--port', name, '--timeout', '300', '--stations', '9']) == 0
 

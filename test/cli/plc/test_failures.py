@@ -56,11 +56,6 @@ PATIENT, IMPATIENT = ('--timeout', '3000'), ('--timeout', '20')
 _PROGRESS = 'trying ', 'station ', 'listening ', 'file '
 
 
-@pytest.fixture(autouse=True)
-def listening_is_short(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr('abdf1_ros.cli.plc.overhear.LISTENED', 0.05)
-
-
 def slc() -> OddDevice:
     """Return station 2 of a half-duplex line, with a clock."""
     device = OddDevice(Wiring.HALF, 2)

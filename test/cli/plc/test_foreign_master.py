@@ -49,6 +49,11 @@ from support.ptys import Pty
 POLL = b'\x10\x05\x01\xFF'
 
 
+@pytest.fixture
+def listening_is_short() -> None:
+    """Listen as long as a user would."""
+
+
 class Master(threading.Thread):
     """
     A master, by hand: it polls ``stations``, and gives what they say to a PLC that is itself.
@@ -177,7 +182,7 @@ def test_slave_that_nobody_polls_says_so(
     monkeypatch.setattr(requests, 'LONGEST_UNPOLLED', 0.3)
     with master_on(tmp_path / 'line', 3) as (port, master):
         assert main(['ping', '1', '--count', '1', '--slave', '--port', port]) == 1
-    assert 'no master has polled us, station 5: "plc detect" lists the stations' in (
+    assert 'no master has polled us, station 5. Next: "plc detect" lists the stations' in (
         capsys.readouterr().err)
 
 

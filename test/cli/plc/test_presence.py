@@ -26,7 +26,6 @@ from abdf1_ros.cli.plc import presence
 from abdf1_ros.cli.plc.command import main
 from abdf1_ros.cli.plc.presence import (
     describe,
-    hint,
     io_access,
     look_at,
     Presence,
@@ -37,6 +36,7 @@ from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.diagnosis.causes import diagnose
 from abdf1_ros.errors import FormatError, RemoteError, StationInactive
 from abdf1_ros.pccc.identity import Identity, Mode
 from abdf1_ros.ports.descriptor import PortAround
@@ -100,19 +100,12 @@ def test_silence_and_noise(tmp_path: Path, mode: str) -> None:
         assert (sent.enq_retries, sent.commands_sent) == (0, mode == 'Peer')
         assert not seen.is_there
         assert not seen.takes_commands
-        duplex = 'full' if mode == 'Peer' else 'half'
-        asked = f'asked with 9600 baud, parity None, {duplex} duplex, CRC: '
-        assert hint(session, 1, seen.error) == (
-            f'{asked}not one character came: station (a PLC-5 shows its own in octal), check or '
-            'duplex wrong? Then cable, port, power, baud rate and parity. "plc detect" tries '
-            'other settings')
+        cause = str(diagnose(session.traces(1)))
+        assert cause.startswith('not one character came')
         line.write(b'\x55\xaa\x00')
-        seen = look_at(session, 1)
-        assert seen.error is not None
-        assert hint(session, 1, seen.error).startswith(f'{asked}3 characters came, but no answer')
-        assert hint(session, 1, FormatError('x')) == ''
-        session.counters.acks_received = 1  # somebody understands us
-        assert hint(session, 1, seen.error) == ''
+        assert look_at(session, 1).error is not None
+        cause = str(diagnose(session.traces(1)))
+        assert cause.startswith('3 characters came, and no answer that makes sense')
     line.close()
 
 
@@ -219,11 +212,11 @@ class Damages(PortAround):
 def test_scan_asks_more_often_while_frames_come_damaged(tmp_path: Path) -> None:
     plc = simulated_plc(1, 'SLC', time.monotonic)
     with plc_line(tmp_path / 'line', plc, around=Damages) as name:
-        said: list[str] = []
+        ended: list[Session] = []
         seen, = scan(Network(com_port=name, timeout=1000, enq_retries=0), [1],
-                     complain=said.append)
+                     ended=ended.append)
     assert (seen.is_there, seen.takes_commands, seen.asked) == (True, False, 4)
-    assert [text.rpartition('characters, ')[2] for text in said] == ['4 damaged frames, 0 NAK']
+    assert [(session.silent, session.counters.damaged_frames) for session in ended] == [(1, 4)]
 
 
 class DamagesOnce(Damages):
@@ -255,11 +248,11 @@ def test_scan_takes_our_own_bytes_for_no_loss(tmp_path: Path) -> None:
 def test_scan_says_what_was_lost_at_first_and_does_not_go_on_for_it(tmp_path: Path) -> None:
     plc = simulated_plc(1, 'SLC', time.monotonic)
     with plc_line(tmp_path / 'line', plc, around=DamagesOnce) as name:
-        said: list[str] = []
+        ended: list[Session] = []
         seen, = scan(Network(com_port=name, timeout=300, nak_retries=0, enq_retries=0), [1],
-                     complain=said.append)
+                     ended=ended.append)
     assert seen.asked == 2
-    assert [', 1 damaged frame, ' in text for text in said] == [True]
+    assert [(session.silent, session.counters.damaged_frames) for session in ended] == [(1, 1)]
 
 
 def test_scan_says_what_came_where_noise_makes_symbols_of_the_answers(
@@ -270,7 +263,7 @@ def test_scan_says_what_came_where_noise_makes_symbols_of_the_answers(
         assert main(['scan', '1-2', '--port', name]) == 1
     said = capsys.readouterr()
     assert '0 of 2 stations answer; silent stations were asked 4 times' in said.out
-    assert 'received: 8 characters, 0 damaged frames, 0 NAK' in said.err
+    assert 'received: 8 characters, 0 damaged frames, 0 NAK; first bytes 10 51 ' in said.err
 
 
 def passthru(station: int = 9) -> OddDevice:

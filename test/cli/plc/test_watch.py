@@ -158,7 +158,7 @@ def draw(monkeypatch: pytest.MonkeyPatch) -> Draw:
                  tags: Tags | None = None, radix: Radix = Radix.DECIMAL) -> list[str]:
         screen = io.TextIOWrapper(io.BytesIO(), encoding, errors='backslashreplace')
         with monkeypatch.context() as patch:
-            patch.setattr('abdf1_ros.cli.plc.reading.opened', lambda network: None)
+            patch.setattr('abdf1_ros.cli.plc.reading.opened', lambda *args: None)
             watch = LiveValues(Network(), mappings, 0.01, radix, tags=tags)
             patch.setattr('sys.stdout', screen)
             patch.setattr('shutil.get_terminal_size', lambda: os.terminal_size(size))
@@ -199,7 +199,7 @@ class Screen:
 def test_nothing_old_stays_below_a_table_that_shrinks(
         monkeypatch: pytest.MonkeyPatch, capsys: Output) -> None:
     screen = Screen('$ plc watch N7:0 C5:0.ACC')
-    monkeypatch.setattr('abdf1_ros.cli.plc.reading.opened', lambda network: None)
+    monkeypatch.setattr('abdf1_ros.cli.plc.reading.opened', lambda *args: None)
     rows = SPEED, make_mapping('C5:0.ACC', item=2)
 
     def show(size: tuple[int, int], *news: tuple[Mapping, Values | NoValue]) -> list[str]:

@@ -31,6 +31,7 @@ import sys
 from abdf1_ros.cli.overhearing import map_of, texts_of
 from abdf1_ros.cli.plc import detect, files, init, overhear, presence
 from abdf1_ros.cli.plc.detect import found_settings, only_heard
+from abdf1_ros.cli.plc.inquiry import conclude
 from abdf1_ros.cli.plc.line import MODES, network_of
 from abdf1_ros.cli.plc.options import (
     add_folder,
@@ -38,7 +39,7 @@ from abdf1_ros.cli.plc.options import (
     add_stations_to_try,
     DETECT_DEFAULTS,
 )
-from abdf1_ros.cli.plc.session import complain, Session
+from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.cli.terminal import called, colour, EXIT_FAILED, GREEN, Progress
 from abdf1_ros.ports.listing import serial_ports
 from abdf1_ros.problems import ConfigurationError, Problem
@@ -124,7 +125,7 @@ def _stations_there(found: detect.Found, network: Network,
     is_full = found.settings.mode == MODES['full']  # the PLC answers to several numbers
     there = {} if is_full and stations else {found.presence.station: found.presence}
     asked = 1
-    for seen in presence.scan(network, stations, complain=complain) if stations else ():
+    for seen in presence.scan(network, stations, ended=conclude) if stations else ():
         if seen.is_there:
             there[seen.station] = seen
         else:

@@ -55,7 +55,7 @@ def _ping(options: argparse.Namespace, session: Session) -> int:
             else:
                 print(f'station {options.station}: {times[-1] * 1000:.1f} ms', flush=True)
     except KeyboardInterrupt:
-        pass  # the interrupted echo does not count
+        session.silent = None  # the user waits no longer; the interrupted echo does not count
     text = f'{failures + len(times)} sent, {len(times)} answered'
     if times:
         text += (f'; shortest {min(times) * 1000:.1f}, mean '

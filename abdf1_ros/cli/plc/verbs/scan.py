@@ -23,11 +23,15 @@ from __future__ import annotations
 import argparse
 
 from abdf1_ros.cli.plc import presence
+from abdf1_ros.cli.plc.inquiry import conclude, is_beside_master
 from abdf1_ros.cli.plc.line import MODES, network_of
 from abdf1_ros.cli.plc.options import add_line, stations_option
-from abdf1_ros.cli.plc.session import complain
+from abdf1_ros.cli.plc.session import complain, Session
 from abdf1_ros.cli.terminal import EXIT_FAILED, Progress
+from abdf1_ros.df1.peer import PEER
 from abdf1_ros.df1.stations import MOST_IN_VAIN
+from abdf1_ros.diagnosis.causes import diagnose
+from abdf1_ros.diagnosis.traces import Traces
 
 _ONE_PLC_ANSWERS_TO_ALL = (
     'in full duplex most PLCs answer to every station number, so these may be one PLC')
@@ -54,8 +58,11 @@ def run(options: argparse.Namespace) -> int:
     found = acknowledged = count = 0
     asked = 1
     network = network_of(options)
+    if is_beside_master(network):
+        return EXIT_FAILED
+    ended: list[Session] = []
     for there in presence.scan(
-            network, options.stations, options.via, progress.show, complain,
+            network, options.stations, options.via, progress.show, ended.append,
             asks_all=options.asks_all):
         count += 1
         if there.is_there:
@@ -67,7 +74,7 @@ def run(options: argparse.Namespace) -> int:
                   f'{presence.again(there.asked)}', flush=True)
         elif there.other_number is not None:  # which is so for all stations
             progress.clear()
-            complain(str(there.evidence))
+            complain(str(diagnose(Traces(PEER, other_number=there.other_number))))
             return EXIT_FAILED
         else:
             acknowledged += there.is_only_acknowledged
@@ -78,4 +85,6 @@ def run(options: argparse.Namespace) -> int:
         print(_LEFT_OUT.format(len(options.stations) - count))
     if found > 1 and network.mode == MODES['full']:
         print(_ONE_PLC_ANSWERS_TO_ALL)
+    for session in ended:
+        conclude(session)
     return 0 if found else EXIT_FAILED

@@ -26,15 +26,14 @@ from __future__ import annotations
 import argparse
 from functools import partial
 
-from abdf1_ros.cli.plc import presence
 from abdf1_ros.cli.plc.asking import ask, mappings_of
+from abdf1_ros.cli.plc.inquiry import concluded
 from abdf1_ros.cli.plc.log import log_values
 from abdf1_ros.cli.plc.log_file import FORMS, LogOutput
 from abdf1_ros.cli.plc.options import add_addresses, add_repetition, RADIXES
-from abdf1_ros.cli.plc.session import complain, Session
+from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.cli.plc.targets import Targets, to_read
 from abdf1_ros.cli.plc.watch import LiveValues
-from abdf1_ros.cli.terminal import EXIT_FAILED
 from abdf1_ros.problems import ConfigurationError, Problem
 
 
@@ -61,7 +60,4 @@ def _watch(options: argparse.Namespace, session: Session, targets: Targets) -> i
     session.close()  # the driver opens the port itself
     watch = LiveValues(session.network, mappings, options.period, RADIXES[options.radix],
                        targets.tags, options.record)
-    failed = watch.run(options.count)
-    if failed:
-        complain(presence.traffic(watch.counters))
-    return EXIT_FAILED if failed else 0
+    return concluded(watch, watch.run(options.count))
