@@ -25,7 +25,7 @@ from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity, Mode
 from abdf1_ros.pccc.processor import Processor
-from abdf1_ros.ros.diagnostics.line import LineView, SWALLOWED
+from abdf1_ros.ros.diagnostics.line import LineView, SHARED_BY_SPLITTER, SWALLOWED
 from abdf1_ros.ros.diagnostics.stations import health_values, LinkCounterService, processor_fault
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
@@ -35,7 +35,7 @@ from std_srvs.srv import Trigger
 from support.cases import for_all
 from support.driver_bench import DriverBench, Recorder
 from support.mappings import make_mapping
-from support.odd_device import OddDevice, Wiring
+from support.odd_device import frame, OddDevice, Wiring
 from support.ros import Observer
 
 NOW = 1000.0
@@ -145,6 +145,23 @@ def test_other_damage_is_not_taken_for_flow_control(
         bench.run(1.0)
         assert SWALLOWED not in line.evidence()
     assert bench.driver.counters.damaged_frames > 10
+
+
+def test_second_user_of_the_port_of_a_plc_is_named() -> None:
+    device, answers = OddDevice(Wiring.FULL), count()
+    bench, line = line_to(device, 'Peer')
+    bench.run(20.0)
+    assert line.evidence() == []
+    hmi = frame(bytes.fromhex('00 01 4f 00 77 77 0f 27'))  # a reply to station 0
+    device.say = lambda data: data + hmi if next(answers) % 2 else data
+    bench.run(20.0)
+    assert line.evidence() == [SHARED_BY_SPLITTER]
+    values = bench.listener.values(bench.mappings[0])
+    assert values and {tuple(value) for value in values} == {(4321,)}
+    device.say = bytes
+    line.port_opened()
+    bench.run(20.0)
+    assert line.evidence() == []
 
 
 def test_values_of_a_processor() -> None:

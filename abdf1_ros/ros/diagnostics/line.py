@@ -44,23 +44,39 @@ _ENOUGH_DAMAGED = 3
 SWALLOWED = ('messages have a wrong check, and no byte 11 or 13 hex has come: does flow control '
              '(XON/XOFF) on the way, as of a device server, swallow them? Set it to none')
 
+# With a second user the foreign replies are at least this number, and this share of all replies.
+_ENOUGH_FOREIGN = 20
+_FOREIGN_SHARE = 0.1
+
+SHARED_BY_SPLITTER = (
+    'many replies come that are not for us: does an HMI or a laptop share the port of the PLC by '
+    'a splitter? Take it off, it may use Share')
+
 # A station that takes no commands counts as silent after this time (s) without a sign of life.
 _HEARD_LATELY = 10.0
 
 
 class _Came(NamedTuple):
-    """Commands that have gone out; good and damaged messages, bytes 11 and 13 that have come."""
+    """
+    Commands that have gone out; good and damaged messages, bytes 11 and 13 that have come.
+
+    ``foreign`` are replies that no command of ours had, and that are not late ones either.
+    """
 
     commands: int
     messages: int
     damaged: int
     flow_controls: int
+    replies: int
+    foreign: int
 
 
 def _came(driver: Driver) -> _Came:
     counters = driver.counters
+    replies = counters.replies_received
     return _Came(counters.commands_sent, counters.messages_received, counters.damaged_frames,
-                 driver.machine.flow_controls)
+                 driver.machine.flow_controls, replies,
+                 replies - driver.tasks.transactions - counters.stale_messages)
 
 
 class LineView:
@@ -138,15 +154,17 @@ class LineView:
     def evidence(self) -> list[str]:
         """Return what the line has shown of stations whose replies do not come, each text once."""
         found = map(self.evidence_of, self.driver.stations)
-        return [*dict.fromkeys(filter(None, (*found, self._swallowed())))]
-
-    def _swallowed(self) -> str:
-        """Return a text if all that has come looks as if bytes 11 and 13 were taken out of it."""
         came = _Came(*(now - before for now, before in zip(
             _came(self.driver), self._before, strict=True)))
-        is_shown = not came.flow_controls and came.damaged >= _ENOUGH_DAMAGED and min(
-            came.commands, came.damaged + came.messages) >= _ENOUGH
-        return SWALLOWED if is_shown else ''
+        return [*dict.fromkeys(filter(None, (*found, _swallowed(came), self._foreign(came))))]
+
+    def _foreign(self, came: _Came) -> str:
+        """Return a text if the port of a full-duplex PLC seems to have a second user."""
+        stations = self.driver.stations
+        is_shown = self.driver.network.line_mode.has_one_plc and came.foreign >= max(
+            _ENOUGH_FOREIGN, _FOREIGN_SHARE * came.replies) and all(
+                stations.other_number(station.number) is None for station in stations)
+        return SHARED_BY_SPLITTER if is_shown else ''
 
     def evidence_of(self, station: Station) -> str:
         stations, number = self.driver.stations, station.number
@@ -193,6 +211,13 @@ def _rows_by_kind(mappings: Iterable[Mapping]) -> dict[int, dict[object, Mapping
         if not mapping.serves:
             rows[mapping.station].setdefault((mapping.plc_type, mapping.processor), mapping)
     return rows
+
+
+def _swallowed(came: _Came) -> str:
+    """Return a text if all that has come looks as if bytes 11 and 13 were taken out of it."""
+    is_shown = not came.flow_controls and came.damaged >= _ENOUGH_DAMAGED and min(
+        came.commands, came.damaged + came.messages) >= _ENOUGH
+    return SWALLOWED if is_shown else ''
 
 
 def takes_in_silence(station: Station) -> bool:
