@@ -19,7 +19,8 @@ from __future__ import annotations
 from abdf1_ros.cip.identity import CipIdentity
 from abdf1_ros.cip.session import EipSession, PcccCommand
 from abdf1_ros.cip.sessions import EipSessions
-from support.ethernet_ip import execute, heard, message, REGISTER, unconnected
+import pytest
+from support.ethernet_ip import execute, heard, message, recorded, REGISTER, unconnected
 
 PLACE = '127.0.0.1', 44818
 
@@ -62,6 +63,27 @@ class Place:
 
 def numbers_of(commands: list[PcccCommand]) -> list[int]:
     return [int.from_bytes(asked.pccc[2:4], 'little') for asked in commands]
+
+
+@pytest.mark.parametrize('client', recorded())
+def test_what_clients_of_others_send_is_understood(client: str) -> None:
+    place, asked = Place(), list[bytes]()
+    place.client()
+    for segments in recorded()[client]:
+        session = place.sessions.came('10.0.0.1:1', PLACE, place.now)
+        assert session is not None
+        for segment in segments:
+            assert place.say(session, segment) == []
+            while (command := place.sessions.next()) is not None:
+                asked.append(command.pccc)
+                command.respond(
+                    bytes((command.pccc[0] | 0x40, 0)) + command.pccc[2:4], place.now)
+            for told in heard(bytes(session.outgoing)):
+                assert told.status == 0
+                if told.command in (0x6F, 0x70):
+                    assert told.cip[2 * (told.command == 0x70):][1:4] == bytes(3)
+            session.outgoing.clear()
+    assert len(asked) >= 4 and {pccc[0] for pccc in asked} == {0x0F}
 
 
 def test_sessions_take_turns() -> None:

@@ -20,10 +20,13 @@ Nothing here comes from the package: a mistake there would not show in a far end
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
 import socket
 import struct
 from typing import NamedTuple
 
+_VECTORS = Path(__file__).resolve().parent.parent / 'vectors' / 'ethernet_ip.json'
 _HEADER = struct.Struct('<HHII8sI')
 CONTEXT = b'\x01who\xff\x00\x7f2'
 REQUESTOR = bytes.fromhex('07 4D 00 78 56 34 12')
@@ -67,6 +70,13 @@ def heard(data: bytes) -> list[Heard]:
         found.append(Heard(command, session, status, context, data[24:24 + length]))
         data = data[24 + length:]
     return found
+
+
+def recorded() -> dict[str, list[list[bytes]]]:
+    """Return what clients of others have sent: by client, its connections and their segments."""
+    clients = json.loads(_VECTORS.read_text('utf-8'))['clients']
+    return {name: [[bytes.fromhex(segment) for segment in segments] for segments in connections]
+            for name, connections in clients.items()}
 
 
 REGISTER = message(0x65, bytes((1, 0, 0, 0)))

@@ -30,7 +30,15 @@ from abdf1_ros.settings.columns import COLUMNS
 from abdf1_ros.settings.network import FIELDS
 from abdf1_ros.simulator import simulated_plc
 from abdf1_ros.sniffer.capture import Chunk, Direction
-from support.ethernet_ip import execute, forward_close, forward_open, message, REGISTER, routed
+from support.ethernet_ip import (
+    execute,
+    forward_close,
+    forward_open,
+    message,
+    recorded,
+    REGISTER,
+    routed,
+)
 from support.vectors import CAPTURED, commands, MESSAGES, VECTORS
 
 TARGETS = ('frames', 'addresses', 'net_csv', 'map_csv', 'simulator_csv', 'typed_data', 'server',
@@ -183,6 +191,11 @@ def _ethernet_ip() -> Iterable[bytes]:
     for request in requests:
         yield b''.join((b'\0\0\1\0', _step(4, request), _step(16, b'\x2A\0'), b'\x0C\x03',
                         bytes(3), _step(5, request), b'\x14\0'))
+    for connections in recorded().values():
+        for segments in connections:
+            # The second session is theirs.
+            yield b'\x01\0' + b''.join(
+                _step(24, segment) + _step(16, b'\x2A\0') for segment in segments)
     for pause in b'', b'\x0C\x0B' + bytes(11):
         yield b''.join((b'\0\0', _step(4, forward_open()), _step(8, read), pause,
                         _step(8 | 128, read), _step(16, b'\x2A\0'), _step(4, forward_close())))

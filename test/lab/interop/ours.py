@@ -39,12 +39,14 @@ from abdf1_ros.ports.endpoints import SerialEndpoint
 from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ros.topics.messages import MESSAGES, values_of, write_qos
+from abdf1_ros.simulator.gateway import stations_of
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 from cases import Case, same, Values
 from std_msgs.msg import String
 from support.ros import Inbox, Observer, Process, ros_args, write_csv
 
 OURS, THEIRS = 5, 1  # stations of the node, and of what answers it
+BESIDE, VIA = 2, 7  # a second station on the line, and a gateway
 PATIENCE = 5.0  # s until a value has to be there
 BEAT = Case('N7:240', [0], [0])  # the heartbeat of a node that shares its line
 
@@ -55,7 +57,8 @@ class Setup:
     What a run is about.
 
     ``access`` is the cell Access of the node's rows; ``serves`` tells that they are Serve.
-    ``share`` is the cell Share: guests may write, and the node has a heartbeat as well.
+    ``share`` is the cell Share: guests have these ``rights``, and the node has a heartbeat.
+    ``via`` is the gateway of the stations. In Mode Master there is a second station.
     """
 
     family: PlcType
@@ -67,6 +70,8 @@ class Setup:
     serves: bool = False
     mode: str = 'Peer'
     share: str = ''
+    rights: str = 'Write'
+    via: int | None = None
 
 
 class End(Protocol):
@@ -97,7 +102,13 @@ class PlcEnd:
         for case in setup.cases:
             address, codec = codec_of(case, setup.family)
             table.create(address, codec.words)
-        self._plc = SimulatedPlc(THEIRS, table, setup.check, time.monotonic)
+        self._plc = SimulatedPlc(THEIRS, table, setup.check, time.monotonic, setup.via)
+        other = SimulatedPlc(BESIDE, DataTable(setup.family), setup.check, time.monotonic,
+                             setup.via)
+        for case in setup.cases:  # other values at the same addresses
+            address, codec = codec_of(case, setup.family)
+            other.table.create(address, codec.words)
+            other.table.write(address, b'\x55' * 2 * codec.words)
         is_peer = setup.mode == 'Peer'
         if is_peer:
             self._plc.be_full_duplex()
@@ -108,7 +119,8 @@ class PlcEnd:
                 self._plc.serve)
             return peer.run(self._plc)
 
-        machine = Machine(run if is_peer else multidrop([self._plc]), checksum=setup.check,
+        machine = Machine(run if is_peer else multidrop(
+            stations_of([self._plc, other], setup.check)), checksum=setup.check,
                           duplex=Duplex.FULL if is_peer else Duplex.HALF,
                           counters=self._plc.counters)
         self._link = LinkThread(machine, SerialEndpoint(PortSettings(setup.port, 19200)).open)
@@ -149,23 +161,26 @@ class NodeEnd:
         self._cases = {case.address: f'v{number}' for number, case in enumerate(setup.cases)}
         self._family = setup.family
         self._serves = setup.serves
-        rows = []
+        rows, via = list[str](), '' if setup.via is None else setup.via
         for case, tag in zip(setup.cases, self._cases.values()):
             command, station = ('Serve', OURS) if setup.serves else (
                 'Read' if case.is_structure else 'ReadWrite', THEIRS)
             rows.append(f'{tag},{command},{case.address},{station},{setup.family.value},'
-                        f'{case.count},{"" if setup.serves else 500},{setup.access}')
+                        f'{case.count},{"" if setup.serves else 500},{setup.access},{via}')
         if setup.share:
-            rows.append(f'beat,Heartbeat,{BEAT.address},{THEIRS},{setup.family.value},,200,')
+            rows.append(
+                f'beat,Heartbeat,{BEAT.address},{THEIRS},{setup.family.value},,200,,{via}')
+        if setup.mode == 'Master':
+            rows.append(f'beside,Read,N7:0,{BESIDE},{setup.family.value},,1000,,{via}')
         net = write_csv(
             setup.folder / 'net.csv',
             'Mode,Station,PLC_Type,Error_Code,Com_Port,Baud,Timeout,Cmd_Timeout,Share,'
             'Share_Access',
             [f'{setup.mode},{OURS},{setup.family.value},{setup.check.value},{setup.port},19200,'
-             f'500,5000,{setup.share},Write'])
+             f'500,5000,{setup.share},{setup.rights}'])
         table = write_csv(
-            setup.folder / 'map.csv', 'Tag,Command,Address,Station,PLC_Type,Length,Period,Access',
-            rows)
+            setup.folder / 'map.csv',
+            'Tag,Command,Address,Station,PLC_Type,Length,Period,Access,Via', rows)
         self._observer = Observer('interop')
         self._results = self._observer.results()
         self._node = Process('node', *ros_args(f'net_file:={net}', f'map_file:={table}'))

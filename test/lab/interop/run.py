@@ -26,7 +26,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, ExitStack, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import json
 import os
 from pathlib import Path
@@ -53,8 +53,8 @@ from abdf1_ros.pccc.server import Server  # noqa: E402
 from abdf1_ros.pccc.values import ValueType  # noqa: E402
 from cases import Case, CASES, same, Values  # noqa: E402
 from ethernet import ask, DuplexLine, EthernetPlc, serve  # noqa: E402
-from ours import codec_of, End, NodeEnd, OURS, PlcEnd, Setup, THEIRS, wanted  # noqa: E402
-from shared import share, Tally  # noqa: E402
+from ours import codec_of, End, NodeEnd, OURS, PlcEnd, Setup, THEIRS, VIA, wanted  # noqa: E402
+from shared import OWN, share, Tally  # noqa: E402
 from support.ros import Process  # noqa: E402
 
 PATIENCE = 60.0  # s for an answer of a player
@@ -261,6 +261,7 @@ class Run:
     only: tuple[str, ...] = ()  # addresses
     access: str = ''
     has_link: bool = True  # its frames on the line are its own
+    reach: Callable[[str], Partner] | None = None  # starts it at the host:port of an eip: place
 
     @property
     def text(self) -> str:
@@ -294,6 +295,36 @@ def carry_out(run: Run, save: Path | None) -> list[tuple[str, str, bool]]:
         partner = run.start(setup, theirs, stack)
         stack.callback(partner.close)
         return [server_case(ours, partner, case) for case in cases]
+
+
+def through_place(run: Run, mode: str, save: Path | None) -> list[tuple[str, str, bool]]:
+    """
+    Let an EtherNet/IP client reach our PLC at a place of our node; return what came of it.
+
+    In Mode Master a second station has other values at the same addresses; "Via" is Mode Master
+    with both stations behind a gateway.
+    """
+    cases = [case for case in CASES if not run.only or case.address in run.only]
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        capture = save / f'{run.name}_place_{mode}_{run.check.value}.cap'.lower() if save else None
+        first, second = stack.enter_context(tapped(folder, capture))
+        number = free_port()
+        setup = Setup(
+            run.family, run.check, second, [*cases, OWN], folder,
+            mode='Peer' if mode == 'Peer' else 'Master', via=VIA if mode == 'Via' else None,
+            share=f'eip:127.0.0.1:{number}?station={THEIRS}', rights='All')
+        plc = PlcEnd(setup)
+        stack.callback(plc.close)
+        for case in cases:
+            plc.give(case, case.before)
+        node = NodeEnd(replace(setup, port=first, cases=(OWN,)))
+        stack.callback(node.close)
+        until_open(number)
+        assert run.reach is not None
+        partner = run.reach(f'127.0.0.1:{number}')
+        stack.callback(partner.close)
+        return [server_case(plc, partner, case) for case in cases]
 
 
 def share_line(run: Run, mode: str, rounds: int) -> Tally:
@@ -462,7 +493,15 @@ def advancedhmi_runs(options: argparse.Namespace) -> list[Run]:
             for check in Checksum]
 
 
-def ethernet_client(program: str, interpreter: str, *args: str
+def ethernet_player(program: str, interpreter: str, *args: str) -> Callable[[str], Partner]:
+    """Return what starts an EtherNet/IP client that talks to a host:port."""
+    def reach(name: str) -> Partner:
+        return Player(interpreter, program, *(name if arg == 'HOST' else arg for arg in args))
+
+    return reach
+
+
+def ethernet_client(reach: Callable[[str], Partner]
                     ) -> Callable[[Setup, str, ExitStack], Partner]:
     """Return what starts an EtherNet/IP client with the shim before the line."""
     def start(setup: Setup, port: str, stack: ExitStack) -> Partner:
@@ -472,26 +511,29 @@ def ethernet_client(program: str, interpreter: str, *args: str
         station = OURS if setup.serves else THEIRS
         threading.Thread(target=serve, daemon=True, args=(
             listening, lambda command: line.execute(command, 0, station))).start()
-        name = f'127.0.0.1:{listening.getsockname()[1]}'
-        return Player(interpreter, program, *(name if arg == 'HOST' else arg for arg in args))
+        return reach(f'127.0.0.1:{listening.getsockname()[1]}')
 
     return start
 
 
 def pycomm3_runs(options: argparse.Namespace) -> list[Run]:
     """Return the runs with pycomm3's driver for SLC and MicroLogix."""
-    start = ethernet_client('pycomm3_client', options.python, 'HOST')
+    reach = ethernet_player('pycomm3_client', options.python, 'HOST')
+    start = ethernet_client(reach)
     # It reads whole elements for their members, of which a Serve row may have one word only.
     rows = tuple(case.address for case in CASES if '.' not in case.address)
-    return [Run('pycomm3', PlcType.SLC, check, ours, start, rows if ours == 'node' else ())
+    return [Run('pycomm3', PlcType.SLC, check, ours, start, rows if ours == 'node' else (),
+                reach=reach)
             for ours in ('plc', 'node') for check in Checksum]
 
 
 def node_runs(options: argparse.Namespace) -> list[Run]:
     """Return the runs with node-drivers, for a PLC-5, and nodepccc, for an SLC."""
+    reach = {product: ethernet_player('node_client.mjs', options.node, options.modules, product,
+                                      'HOST') for product in ('node-drivers', 'nodepccc')}
     return [
-        Run(product.replace('-', '_'), family, check, ours, ethernet_client(
-            'node_client.mjs', options.node, options.modules, product, 'HOST'))
+        Run(product.replace('-', '_'), family, check, ours, ethernet_client(reach[product]),
+            reach=reach[product])
         for product, family in (('node-drivers', PlcType.PLC5), ('nodepccc', PlcType.SLC))
         for ours in ('plc', 'node') for check in Checksum]
 
@@ -499,10 +541,13 @@ def node_runs(options: argparse.Namespace) -> list[Run]:
 def libplctag_runs(options: argparse.Namespace) -> list[Run]:
     """Return the runs with libplctag as client, and with its ab_server."""
     names = {PlcType.SLC: 'slc500', PlcType.PLC5: 'plc5'}
+    reach = {family: ethernet_player(
+        'libplctag_client', options.python, options.library, 'HOST', name)
+        for family, name in names.items()}
     runs = [
-        Run('libplctag', family, check, ours,
-            ethernet_client('libplctag_client', options.python, options.library, 'HOST', name))
-        for family, name in names.items() for ours in ('plc', 'node') for check in Checksum]
+        Run('libplctag', family, check, ours, ethernet_client(reach[family]),
+            reach=reach[family])
+        for family in names for ours in ('plc', 'node') for check in Checksum]
     if not options.ab_server:
         return runs
 
@@ -532,6 +577,14 @@ def libplctag_runs(options: argparse.Namespace) -> list[Run]:
                 'WordRange', has_link=False))]
 
 
+def show(name: str, told: list[tuple[str, str, bool]]) -> bool:
+    """Print what came of a run; return whether all was good."""
+    print(f'{name}:', flush=True)
+    for address, text, good in told:
+        print(f'  {"good" if good else "BAD "} {address:<10} {text}', flush=True)
+    return all(good for _, _, good in told)
+
+
 def main() -> int:
     """Carry out the runs with one product."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -542,6 +595,8 @@ def main() -> int:
     parser.add_argument('--share', metavar='ROUNDS', type=int,
                         help='let two of them share the line of our node')
     parser.add_argument('--only', default='', help='only runs whose name has this in it')
+    parser.add_argument('--place', action='store_true',
+                        help='let those that speak EtherNet/IP reach our PLC through our node')
     products = parser.add_subparsers(dest='product', required=True)
     products.add_parser('df1py3').set_defaults(runs=df1py3_runs)
     entry = products.add_parser('libpccc')
@@ -572,16 +627,16 @@ def main() -> int:
     for run in options.runs(options):
         if options.only not in run.text:
             continue
-        if options.share is not None:
+        if options.place:
+            for mode in ('Peer', 'Master', 'Via') if run.ours == 'plc' and run.reach else ():
+                all_good &= show(f'{run.text}, {mode}', through_place(run, mode, options.save))
+        elif options.share is not None:
             for mode in ('Peer', 'Master') if run.ours == 'plc' else ():
                 tally = share_line(run, mode, options.share)
                 print(f'{run.text}, {mode}: {tally}', flush=True)
                 all_good &= tally.is_good
         elif options.conform is None:
-            print(f'{run.text}:', flush=True)
-            for address, text, good in carry_out(run, options.save):
-                print(f'  {"good" if good else "BAD "} {address:<10} {text}', flush=True)
-                all_good &= good
+            all_good &= show(run.text, carry_out(run, options.save))
         elif run.ours == 'client':
             print(f'{run.text}:' if run.has_link else
                   f'{run.text}: not judged, as its frames are ours', flush=True)

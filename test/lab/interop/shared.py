@@ -35,7 +35,7 @@ from cases import Case, same, Values
 from ours import BEAT, NodeEnd, PlcEnd, Setup
 
 _GUESTS = Case('N7:0', [0.0] * 60, []), Case('N7:100', [0.0] * 60, [])
-_OURS = Case('N7:200', [1, 2, 3, 4], [4112, -1, 16, 0])
+OWN = Case('N7:200', [1, 2, 3, 4], [4112, -1, 16, 0])
 PATIENCE = 10.0  # s until words are written: AbDf1 does not say when
 _LONGEST_BEAT = 1.0  # s between two changes of a heartbeat of 200 ms, on a busy machine
 
@@ -75,9 +75,9 @@ def share(setup: Setup, lines: tuple[str, str], start: Callable[[Setup, str, Exi
     product at a port.
     """
     places = [setup.folder / name for name in ('one', 'two')]
-    plc = PlcEnd(replace(setup, port=lines[1], cases=(*_GUESTS, _OURS, BEAT)))
+    plc = PlcEnd(replace(setup, port=lines[1], cases=(*_GUESTS, OWN, BEAT)))
     stack.callback(plc.close)
-    node = NodeEnd(replace(setup, port=lines[0], cases=(_OURS,),
+    node = NodeEnd(replace(setup, port=lines[0], cases=(OWN,),
                            share=' '.join(f'pty:{place}' for place in places)))
     stack.callback(node.close)
     guests = []
@@ -93,11 +93,11 @@ def share(setup: Setup, lines: tuple[str, str], start: Callable[[Setup, str, Exi
         done = [pool.submit(work, guest, case, plc, rounds) for guest, case in guests]
         watch = pool.submit(_watch, plc, tally, ended)
         while not all(future.done() for future in done):
-            for values in (_OURS.before, _OURS.after):
-                node.give(_OURS, values)
-                good = same(values, plc.take(_OURS, values)) and same(
-                    values, node.take(_OURS, values))
-                tally.ours += good * _OURS.count
+            for values in (OWN.before, OWN.after):
+                node.give(OWN, values)
+                good = same(values, plc.take(OWN, values)) and same(
+                    values, node.take(OWN, values))
+                tally.ours += good * OWN.count
                 tally.wrong_ours += not good
         ended.set()
     watch.result()

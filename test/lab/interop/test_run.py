@@ -35,6 +35,7 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.pccc.families import dialect_of
 from abdf1_ros.pccc.file_types import PlcType
 import pytest
+from support.ethernet_ip import EthernetClient
 from support.ptys import PATIENCE, read_exactly
 
 _HERE = Path(__file__).resolve().parent
@@ -92,6 +93,26 @@ def test_every_value_goes_to_and_fro(run: ModuleType) -> None:
         return Client(run, setup, port)
 
     told = run.carry_out(run.Run('ourselves', PlcType.SLC, Checksum.BCC, 'plc', start), None)
+    assert [entry for entry in told if not entry[2]] == []
+    assert len(told) == len(run.CASES)
+
+
+class ClientOfPlace(Client):
+    """A client of our own at an eip: place, byte by byte."""
+
+    def __init__(self, module: ModuleType, family: PlcType, name: str) -> None:
+        self._codec_of, self._wanted = module.codec_of, module.wanted
+        self._family, self._dialect = family, dialect_of(family)
+        host, port = name.split(':')
+        self._line = EthernetClient(host, int(port), is_connected=True)
+        self._tns = 0
+
+
+@pytest.mark.parametrize('mode', ['Peer', 'Via'])
+def test_every_value_goes_through_an_ethernet_place(run: ModuleType, mode: str) -> None:
+    entry = run.Run('ourselves', PlcType.SLC, Checksum.CRC, 'plc', None,
+                    reach=lambda name: ClientOfPlace(run, PlcType.SLC, name))
+    told = run.through_place(entry, mode, None)
     assert [entry for entry in told if not entry[2]] == []
     assert len(told) == len(run.CASES)
 
