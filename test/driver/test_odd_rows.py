@@ -27,6 +27,7 @@ from typing import Any
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome
 from abdf1_ros.messages import Message
+from abdf1_ros.ros.diagnostics.line import LineView
 from abdf1_ros.settings.heartbeats import Fallback, While
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
@@ -261,6 +262,28 @@ def test_good_rows_wait_for_one_failed_try_while_the_odd_of_twenty_are_found(
     assert len(bench.listener.changes) <= 2
     outcomes = [result.outcome for result in bench.listener.results]
     assert len(outcomes) >= 75 and outcomes.count(Outcome.WRITTEN) >= len(outcomes) - 1
+
+
+@LONG_MODES
+def test_short_rows_are_tried_first_where_ten_long_ones_never_pass(mode: str) -> None:
+    """Where the map begins with them, and no row was read before."""
+    a_try = longest_tries(mode)
+    good = [make_mapping(f'N{file}:0', plc='SLC', length=8, period=500) for file in range(20, 30)]
+    odd = [make_mapping(f'N{file}:0', plc='SLC', length=100, period=500)
+           for file in range(60, 70)]
+    bench = DriverBench([*odd, *good], network=network(mode), far=Plc(mode, damages_long))
+    view, told = LineView(bench.driver), set[str]()
+    begun = 4 * a_try
+    bench.run(begun)
+    for _ in range(300):
+        bench.run(0.2)
+        told |= {*view.evidence(), *map(str, view.garbled_stations(bench.clock()))}
+    for row in good:
+        most = 8 / 7 * bench.driver.points[row].stale_time + a_try
+        times = [0.0, *bench.listener.times(row), begun + 60.0]
+        assert times[1] < begun and max(b - a for a, b in pairwise(times)) < most + a_try
+    assert told == set()  # no fault of the station: its other rows are read
+    assert len(bench.listener.changes) <= 2
 
 
 @LONG_MODES

@@ -40,6 +40,7 @@ from abdf1_ros.driver.overheard import Carried
 from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome, Write, WriteResult
+from abdf1_ros.errors import CommandTimeout
 from abdf1_ros.messages import Event, Message
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity, Mode
@@ -747,6 +748,11 @@ def test_rows_that_cannot_keep_their_period_are_named_with_one_that_would_do(
     assert bench.says('mappings', NOW) == (WARN, (
         'WARN: of 5 mappings 5 fresh; Period not kept: faster (Period 50 ms, kept 206 ms), '
         'fast (Period 100 ms, kept 405 ms); the line can keep Period 1000'))
+    odd = bench.driver.stations.odd
+    odd.judge('another', 1, CommandTimeout(sent=True), NOW, is_counted=True)
+    assert bench.says('mappings', NOW)[1].endswith(
+        'kept 405 ms); commands that get no whole reply take time of the line')
+    odd.passed('another')
     read_until(NOW + 45, {'fast': 0.14, 'slow': 1.3, 'free': 1.0, 'faster': 0.06})
     bench.point('asked').fail('no reply')
     bench.driver.spent[bench.mapping('fast')] = 36.0

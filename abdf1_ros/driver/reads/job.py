@@ -39,28 +39,27 @@ class Intervals:
     """
     The seconds between good reads: the ``last`` ones, the ``usual`` and the ``longest``.
 
-    An outage of the station does not count. ``since`` is the clock value (s) of the last good read
-    after it, minus infinity before the first.
+    An outage of the station does not count.
     """
 
     def __init__(self) -> None:
         self.last: float | None = None
         self.usual: float | None = None
         self.longest: float | None = None
-        self.since = -math.inf
+        self._since: float | None = None
 
     def good_read(self, now: float) -> None:
         """Record a good read."""
-        if self.since > -math.inf:
-            self.last = now - self.since
+        if self._since is not None:
+            self.last = now - self._since
             self.longest = max(self.last, self.longest or 0.0)
             usual = self.last if self.usual is None else self.usual
             self.usual = usual + SMOOTHING * (self.last - usual)
-        self.since = now
+        self._since = now
 
     def outage(self) -> None:
         """Record that a read has failed."""
-        self.last, self.since = None, -math.inf
+        self.last = self._since = None
 
 
 class _PacketRead(NamedTuple):
@@ -84,6 +83,7 @@ class ReadJob(Job):
       waits for another one.
     - ``started``: when the read under way, or the last one, began.
     - ``asked``: when its last packet was sent.
+    - ``passed``: when the last good read ended, minus infinity before the first.
     - ``longest_read``: seconds within which all packets of a read have to come.
     - ``is_unfinished``: some packets of a read have come, but not all, or the last read was too
       old.
@@ -102,7 +102,7 @@ class ReadJob(Job):
         self.points = {point: block.slice_of(point.mapping) for point in points}
         self.intervals = Intervals()
         self.due = self.started = self.asked = 0.0
-        self.refreshed = self.wanted = -math.inf
+        self.refreshed = self.wanted = self.passed = -math.inf
         self.is_on_demand = block.mappings[0].is_on_demand
         self.is_unfinished = False
         self.ticket = 0
@@ -154,6 +154,7 @@ class ReadJob(Job):
         """Record a good read."""
         if self.started >= self.refreshed:
             self.refreshed = -math.inf
+        self.passed = now
         self.intervals.good_read(now)
 
     def interrupted(self) -> None:

@@ -43,7 +43,8 @@ class Reads(WriteListener):
 
     ``queue`` has the jobs that wait for their time, ``aside`` the jobs of silent stations.
     ``kept_back`` has the jobs that are due and have failed, or may fail as others have. The one
-    with the fewest failures goes first, then the first one due.
+    with the fewest failures goes first. Of those without, it is the one that has passed last, or
+    the shortest: fewer of its bytes can be bad.
     """
 
     def __init__(self, stations: ActiveStationList) -> None:
@@ -168,7 +169,7 @@ class Reads(WriteListener):
         if station is None:
             return None
         jobs = self.aside.pop(station)
-        job = self._instead_of(min(jobs, key=self._failures), now)
+        job = self._instead_of(min(jobs, key=self._order), now)
         if job in jobs:
             jobs.remove(job)
         job.due, job.is_probe, job.is_untested = now, True, False
@@ -196,8 +197,7 @@ class Reads(WriteListener):
             now >= odd.next(job.key) or is_free and not odd.is_odd(job.key))]
         if not may_go:
             return None
-        kept = min(may_go, key=lambda job: odd.rank(job.key))
-        job = self._instead_of(kept, now)
+        job = self._instead_of(min(may_go, key=self._order), now)
         if job in self.kept_back:
             self.kept_back.remove(job)
         job.is_probe, job.is_untested = False, not self._failures(job)
@@ -211,17 +211,22 @@ class Reads(WriteListener):
     def _is_untested(self, job: ReadJob) -> bool:
         """Tell whether a read has not passed since others of its station have begun to fail."""
         return not job.is_on_demand and (
-            job.intervals.since < self._stations.odd.since(job.station) < math.inf)
+            job.passed < self._stations.odd.since(job.station) < math.inf)
 
     def _failures(self, job: ReadJob) -> int:
         return self._stations.odd.failures(job.key)
+
+    def _order(self, job: ReadJob) -> tuple[int, float, int]:
+        """Return the place of a read among those that are kept back; the least goes first."""
+        rank = self._stations.odd.rank(job.key)
+        return (rank, 0.0, 0) if rank else (rank, -job.passed, job.block.words)
 
     def _instead_of(self, job: ReadJob, now: float) -> ReadJob:
         """
         Return another read, due or not, if the station has replied to none since a failure.
 
-        It shows whether the station replies, so it is the one that has passed last. Otherwise one
-        that fails could go first again and again, and make the station inactive each time.
+        It shows whether the station replies. Otherwise one that fails could go first again and
+        again, and make the station inactive each time.
         """
         if not self._stations.odd.is_doubtful(job.station):
             return job
@@ -229,7 +234,7 @@ class Reads(WriteListener):
                   if other.station == job.station and not self._failures(other)]
         if not others:
             return job
-        other = max(others, key=lambda other: other.intervals.since)
+        other = min(others, key=self._order)
         if other not in self.kept_back:
             self.queue.take_early(other, now)
         return other

@@ -20,6 +20,7 @@ from collections.abc import Iterable
 from collections.abc import Mapping as MappingType
 import math
 
+from abdf1_ros.df1.odd import OddCommands
 from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.plan.report import PERIOD_STEPS
 from abdf1_ros.settings.mapping import Mapping
@@ -71,16 +72,21 @@ def _filled(parts: MappingType[Mapping, float]) -> str:
 
 
 class SlowRows:
-    """The rows whose reads do not keep their Period, as measured and not as planned."""
+    """
+    The rows whose reads do not keep their Period, as measured and not as planned.
 
-    def __init__(self, points: Iterable[ReadPoint]) -> None:
+    While commands of ``odd`` fail, these are the cause, and no Period is advised.
+    """
+
+    def __init__(self, points: Iterable[ReadPoint], odd: OddCommands) -> None:
+        self._odd = odd
         self._points = [point for point in points if point.mapping.polls and point.period
                         and not point.mapping.is_on_demand]
         self._slow: dict[ReadPoint, float] = {}
         self._next_look = 0.0
 
     def text(self, now: float) -> str:
-        """Return the slowest rows and a Period that can be kept; empty if no row is slow."""
+        """Return the slowest rows, and the cause or a Period that can be kept; empty for none."""
         if now >= self._next_look:
             self._next_look = now + _LOOK_PERIOD
             self._slow = self._look(now)
@@ -97,6 +103,8 @@ class SlowRows:
                 and point.kept > point.period * (_STILL_SLOW if point in self._slow else _SLOW)}
 
     def _advice(self) -> str:
+        if self._odd.failed:
+            return '; commands that get no whole reply take time of the line'
         # The line can do the present reads. So it can also read all rows as seldom as the slowest
         # row.
         needed = max(self._slow.values()) / _ADVISED_LOAD * 1000

@@ -53,7 +53,7 @@ class MappingsStatus:
         self._names = {
             f'{NAMES_OF_BITS}{mapping.topic}': BETWEEN_NAMES.join(mapping.named_places())
             for mapping in driver.points if mapping.bits}
-        self._slow = SlowRows(driver.points.values())
+        self._slow = SlowRows(driver.points.values(), driver.stations.odd)
         self._full = FullLine(driver.spent)
 
     def judge(self, now: float) -> Judgement:
