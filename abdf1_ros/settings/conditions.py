@@ -153,11 +153,12 @@ def _fallback_values(texts: Sequence[str], mapping: Mapping,
     low, high = max(low, mapping.minimum), min(high, mapping.maximum)
     for text in texts:
         value = decimal_number(text)
-        if value is None or not low <= value <= high:
+        if mapping.type is ValueType.BOOL and value != 0:
+            fault('Fallback', f'Fallback "{shown(text)}" should be 0: a bool falls back to 0, '
+                              'because a 1 may be the pulse that starts something')
+        elif value is None or not low <= value <= high:
             fault('Fallback', f'Fallback "{shown(text)}" should be a number from {low:.10g} '
                               f'to {high:.10g}')
-        elif mapping.type is ValueType.BOOL and value:
-            fault('Fallback', 'a bool falls back to 0: a 1 may be the pulse that starts something')
         else:
             yield value
 

@@ -31,6 +31,7 @@ from abdf1_ros.pccc.values import ValueType
 from abdf1_ros.problems import Problem
 from abdf1_ros.settings.columns import MAP_COLUMNS
 from abdf1_ros.settings.csv_table import Row
+from abdf1_ros.settings.described import described_otherwise
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.names import in_ascii
 from abdf1_ros.settings.network import Network
@@ -104,6 +105,7 @@ def row_remarks(row: Row, mapping: Mapping) -> Iterator[Problem]:
         yield _at(row, 'Address', f'{address}: a {USUAL.value}, the default of Processor, has no '
                                   f'such file; {having(address)} may have it')
     yield from _bcd_remarks(row, mapping)
+    yield from described_otherwise(row, mapping)
     last = mapping.place_of(mapping.length - 1)
     if mapping.plc_type is PlcType.PLC5 and not mapping.serves \
             and last.element > USUAL_LAST_ELEMENT:

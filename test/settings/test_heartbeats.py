@@ -205,7 +205,9 @@ def test_rule_28_what_a_single_publisher_is_not_for(cells: dict[str, str], text:
     ({'Length': '2', 'Fallback': '0 stop', 'Fallback_After': '500'},
      'Fallback "stop" should be a number'),
     ({'Address': 'B3:0/1', 'Length': '2', 'Fallback': '0 1', 'Fallback_After': '500'},
-     'a bool falls back to 0'),
+     'Fallback "1" should be 0: a bool falls back to 0, because a 1 may be the pulse that'),
+    ({'Address': 'B3:0/1', 'Fallback': 'true', 'Fallback_After': '500'},
+     'Fallback "true" should be 0: a bool falls back to 0'),
     ({'Command': 'ReadWrite', 'Fallback': '0'},
      'a ReadWrite row has no Fallback: it is for Write and Serve rows'),
     ({'Command': 'Read', 'Fallback': '0'}, 'a Read row has no '

@@ -332,10 +332,10 @@ def test_station_with_a_leading_zero_in_either_file(
     assert remarks_of(tmp_path, row) == [f':2:4 (Station): {text}']
 
 
-def remarks_of(folder: Path, row: str) -> list[str]:
+def remarks_of(folder: Path, row: str, header: str = HEADER) -> list[str]:
     """Return the remarks about a row without the name of the file, of which it is the first."""
     path = folder / 'map.csv'
-    path.write_text(f'{HEADER}\n{row}\n', encoding='utf-8')
+    path.write_text(f'{header}\n{row}\n', encoding='utf-8')
     (mapping,), problems = load_mappings(str(path))
     assert not problems
     return [str(remark).removeprefix(str(path)) for remark in mapping.remarks]
@@ -373,3 +373,36 @@ def remarks_of(folder: Path, row: str) -> list[str]:
     ('speed,Read,N7:0,018,SLC,,,,,', [])])
 def test_row_that_is_valid_and_odd(tmp_path: Path, row: str, expected: list[str]) -> None:
     assert remarks_of(tmp_path, row) == expected
+
+
+HEAD_OF_WORDS = 'Tag,Command,Address,Station,PLC_Type,Length,Type,Max,Fallback,Fallback_After,' \
+    'Description'
+
+
+@for_all(('row', 'expected'), [
+    ('door,Read,B3:0,1,SLC,12,,,,,', [
+        ':2:6 (Length): Length 12 from B3:0 on is 12 words; 12 bits are B3:0/0 with Length 12. If '
+        'words are meant, say so with Type uint16']),
+    ('door,Read,B3:0,1,SLC,12,uint16,,,,', []), ('door,Read,B3:0,1,SLC,20,,,,,', []),
+    ('door,Read,B3:0-11,1,SLC,,,,,,', []), ('door,Read,B3:0/0,1,SLC,12,,,,,', []),
+    ('door,Read,B3:0/0,1,SLC,,,,,,12 bits of the cell', [
+        ':2:6 (Length): Length is 1, and the Description says "12 bits"']),
+    ('door,Read,B3:0/0,1,SLC,12,,,,,12 bits of the cell', []),
+    ('door,Read,B3:0,1,SLC,,,,,,a word of 12 bits', []),
+    ('recipe,Write,N7:0,1,SLC,,,,,,10 words', [
+        ':2:6 (Length): Length is 1, and the Description says "10 words"']),
+    ('recipe,Write,N7:0,1,SLC,5,float32,,,,10 words', []),
+    ('job_request,Write,N7:0,1,SLC,,,,1,500,', [
+        ':2:9 (Fallback): by its name this row requests something; after the last message its '
+        'Fallback goes on requesting, and 0 would not']),
+    ('job_request,Write,N7:0,1,SLC,,,,0,500,', []),
+    ('restart_level,Write,N7:0,1,SLC,,,,5,500,', []),
+    ('level,Write,N7:0,1,SLC,,,1000,,,Level [%]', [
+        ':2:8 (Max): Max 1000 is in the unit of the topic, where the Description ends at 100']),
+    ('speed,Write,N7:0,1,SLC,,,1500,,,0 to 15.5 m/s', [
+        ':2:8 (Max): Max 1500 is in the unit of the topic, where the Description ends at 15.5']),
+    ('speed,Write,N7:0,1,SLC,,,100,,,"Level 0-100 [%], zone 3-5"', []),
+    ('speed,Write,N7:0,1,SLC,,,100,,,zones 3 to 5', []), ('speed,Read,N7:0,1,SLC,,,,,,[%]', [])])
+def test_row_that_does_not_fit_its_own_words(
+        tmp_path: Path, row: str, expected: list[str]) -> None:
+    assert remarks_of(tmp_path, row, HEAD_OF_WORDS) == expected
