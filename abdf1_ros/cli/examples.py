@@ -33,4 +33,5 @@ def _run(name: str) -> None:
 command_writer = partial(_run, 'command_writer')
 handshake = partial(_run, 'handshake')
 interlock_consumer = partial(_run, 'interlock_consumer')
+night = partial(_run, 'night')
 recorder = partial(_run, 'recorder')

@@ -17,7 +17,7 @@
 from pathlib import Path
 from xml.etree import ElementTree
 
-from abdf1_ros.cli.monitor.view import NodeView, Reading, ShownStatus, Style, TextLine
+from abdf1_ros.cli.monitor.view import NodeView, ShownStatus, Style, TextLine, TopicRow
 import pytest
 
 from tools import picture
@@ -34,7 +34,7 @@ def texts(svg: str) -> list[str]:
 
 
 def snapshot(value: float, received: float, *statuses: ShownStatus) -> NodeView:
-    reading = Reading('speed', [value], 'N7:0', received, 1.0)
+    reading = TopicRow('speed', [value], 'N7:0', received, 1.0)
     return NodeView('/abdf1', True, 0.0, statuses, [reading], None, [])
 
 
