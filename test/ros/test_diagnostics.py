@@ -21,7 +21,7 @@ from pathlib import Path
 import re
 import time
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 from abdf1_ros.cli.monitor import plant, view
 from abdf1_ros.df1.echo import COMES_BACK
@@ -945,7 +945,8 @@ def test_bit_of_the_plc_confirms_control_while_it_is_fresh_and_1(
 
 def test_guests_are_counted_and_told_of(bench: Bench) -> None:
     guests = [Guest('pty:a', is_connected=True, commands=1, slowest=0.25), Guest('tcp:7')]
-    lines: Any = [SimpleNamespace(guest=guest, fault='', state='open') for guest in guests]
+    lines: Any = [SimpleNamespace(guest=guest, fault='', state='open', waiting=0)
+                  for guest in guests]
     bench.diagnostics = Diagnostics('line_a', bench.driver, PORT, bench.events, guests=lines)
     status = bench.status('guests')
     assert (status.level, status.message, status.hardware_id) == (
@@ -953,7 +954,7 @@ def test_guests_are_counted_and_told_of(bench: Bench) -> None:
     guests[1].commands = guests[1].refused = guests[1].collisions = 1
     guests[0].refused = guests[0].unanswered = 2
     guests[0].outside = 3
-    guests[0].waiting.extend(cast(Any, range(3)))
+    lines[0].waiting = 3
     assert bench.says('guests') == (WARN, (
         'WARN: 1 of 2 guests are connected; 3 commands not allowed; 3 writes outside of limits; '
         '1 write to words of this bridge'))
