@@ -29,6 +29,7 @@ from abdf1_ros.df1.echo import COMES_BACK
 from abdf1_ros.df1.peer import PEER
 from abdf1_ros.df1.radio import RADIO
 from abdf1_ros.df1.slave_link import SLAVE
+from abdf1_ros.df1.stations import MOST_IN_VAIN
 from abdf1_ros.diagnosis.traces import Traces
 
 
@@ -130,7 +131,7 @@ RULES = (
          lambda t: t.is_garbled and not t.replies,
          'station {t.station} replies, but each reply has a wrong check: something on the way '
          'changes bytes',
-         'look for flow control, a telnet port and long messages; then ' + _NOISE,
+         'look for flow control, a telnet port and long messages, then for noise',
          Traces(damaged=4, is_garbled=True), Decider.ECHOES),
     Rule('half duplex: DLE NAK, which no slave sends',
          lambda t: t.mode.is_master and t.naks + t.naks_to_polls > 0 and not t.settings,
@@ -152,6 +153,13 @@ RULES = (
          '{t.late:.1f} s',
          'set Cmd_Timeout in net.csv to more than that; "plc ping" shows how long answers take',
          Traces(acks=1, polls=9, polls_answered=9, late=1.4)),
+    Rule(f'full duplex: DLE ACK to {MOST_IN_VAIN} commands in a row, and no reply',
+         lambda t: t.is_left_alone and t.gateway is None,
+         f'station {{t.station}} is not asked any more: {MOST_IN_VAIN} commands in a row were '
+         'acknowledged and had no reply. Each may cost an SLC with passthru one of 30 buffers '
+         'until it is switched off',
+         'is the number right? A write, ~/read_now or a new start of the node asks again',
+         Traces(PEER, acks=5, is_acknowledged=True, is_left_alone=True)),
     Rule('full duplex, or behind a gateway: DLE ACK, and no reply',
          lambda t: t.is_acknowledged and t.gateway is None,
          'commands to station {t.station} are acknowledged, and no reply comes: is the number '
@@ -182,6 +190,11 @@ RULES = (
          'station {t.on_line} takes commands, but does not reply in time',
          'raise Cmd_Timeout in net.csv; "plc ping" shows how long answers take',
          Traces(acks=1, polls=9, polls_answered=9), Decider.POLL),
+    Rule('DLE ACK, and no reply in time',
+         lambda t: t.acks > 0,
+         'station {t.station} takes commands, but does not reply in time',
+         'raise Cmd_Timeout in net.csv; "plc ping" shows how long answers take',
+         Traces(PEER, acks=1)),
     Rule('half duplex: polls are answered, commands are not, whichever check they have',
          lambda t: t.mode.is_master and t.polls_answered > 0 and t.takes_other_check is False,
          'station {t.on_line} answers polls, but no command, with CRC or with BCC: it has no '
@@ -208,6 +221,10 @@ RULES = (
          'right',
          'look at station {t.on_line}: power, its number (a PLC-5 shows its own in octal), its '
          'plug and its settings', Traces(station=2, polls=1, neighbour=1, neighbour_answers=True)),
+    Rule('nothing any more, after answers before',
+         lambda t: t.was_heard,
+         'station {t.station} has answered before, and is silent now',
+         'look at its power, its plug, the port and the cable', Traces(was_heard=True)),
     Rule('"plc detect": bytes with some settings, and no DF1',
          lambda t: t.settings > 0 and t.characters > 0,
          'characters come with {t.noisy} of {t.settings} settings, and none of them is DF1: noise '

@@ -71,7 +71,9 @@ class Traces:
     - ``settings``: number of settings of the line that ``plc detect`` has tried, 0 for other
       commands; ``noisy``: with how many of them characters came.
     - ``is_acknowledged``: commands had an ACK that is not the station's own, and no reply.
+    - ``is_left_alone``: for this reason no further command goes to it by itself.
     - ``is_garbled``: replies of the station come, and none arrives whole.
+    - ``was_heard``: the station has answered before.
 
     What a question has shown is None if it was not asked:
 
@@ -107,7 +109,9 @@ class Traces:
     settings: int = 0
     noisy: int = 0
     is_acknowledged: bool = False
+    is_left_alone: bool = False
     is_garbled: bool = False
+    was_heard: bool = False
     takes_other_check: bool | None = None
     is_polled_port: bool | None = None
     neighbour: int | None = None

@@ -330,8 +330,8 @@ def test_number_to_which_a_gateway_replies_is_told_also_where_all_works(
     for _ in range(2):
         stations.heard(1, NOW)
     told = ('replies come to number 8, not to ours: a gateway such as the 1770-KF2 and KF3 '
-            'replies to its own number. Make it our Station: 8 in net.csv, or --own-station 8 of '
-            '"plc"')
+            'replies to its own number. Next: make it our Station: 8 in net.csv, or --own-station '
+            '8 of "plc"')
     assert bench.says('link') == (WARN, f'WARN: port open; {told}')
     assert bench.says('station 1')[0] == OK
     assert [[news.text for watch in watches for news in watch.look(NOW)] for _ in range(2)] == [
@@ -587,8 +587,7 @@ def test_station_that_answers_polls_and_no_command(bench: Bench) -> None:
     for _ in range(2):
         stations.lost(1, NOW)
         stations.heard(1, NOW)
-    told = WARN, ('WARN: station 1 answers polls, but no command: is Error_Code right, and '
-                  'Cmd_Timeout long enough?')
+    told = WARN, 'WARN: station 1 answers polls, but no command: is Error_Code right?'
     assert bench.says('station 1') == told
     assert bench.says('link') == (
         WARN, 'WARN: port open, but 1 of 2 stations answer polls and no command')
@@ -602,6 +601,39 @@ def test_station_that_answers_polls_and_no_command(bench: Bench) -> None:
     stations.heard(1, NOW + 12)
     stations[1].returns = 0  # by a reply
     assert bench.says('station 1', NOW + 12)[0] == OK
+
+
+def cause_of(bench: Bench) -> tuple[str, str]:
+    values = bench.details('link')
+    return values.get('cause', ''), values.get('next step', '')
+
+
+def test_link_tells_cause_and_next_step_of_a_missing_answer(bench: Bench,
+                                                            make_bench: Benches) -> None:
+    stations, counters = bench.driver.stations, bench.driver.counters
+    assert cause_of(bench) == ('', '')
+    counters.polls_sent = 1
+    for number in (1, 2):
+        stations.lost(number, NOW)
+    assert cause_of(bench)[0].startswith('not one character came, not even to a poll: no station')
+    counters.chars_received = 40
+    assert cause_of(bench) == (
+        '40 characters came, and no answer that makes sense: another baud rate or parity, noise, '
+        'or another protocol', '"plc detect" tries other settings')
+    stations.heard(1, NOW)
+    stations[1].replies = 3
+    assert cause_of(bench)[0] == (
+        'station 2 is silent, and station 1 answers: port and settings are right')
+    stations.lost(1, NOW)
+    assert cause_of(bench)[0] == 'station 1 has answered before, and is silent now'
+    peer = make_bench('speed,Read,N7:0,1,SLC,1000', mode='Peer')
+    peer.driver.stations.lost(1, NOW)
+    peer.driver.counters.naks_received = 4
+    assert cause_of(peer) == ('the PLC answers DLE NAK to all: is Error_Code right?',
+                              'try the other Error_Code, BCC')
+    listening = make_bench('speed,Read,N7:0,1,SLC,1000', mode='Listen')
+    listening.driver.stations.lost(1, NOW)
+    assert cause_of(listening) == ('', '')
 
 
 @pytest.mark.parametrize('is_full_duplex', [False, True])
@@ -618,8 +650,9 @@ def test_station_whose_replies_never_arrive_whole_is_not_said_to_take_no_command
             stations.lost(1, NOW)
             stations.heard(1, NOW)
     assert bench.says('station 1') == (
-        WARN, 'WARN: station 1 replies, but each reply has a wrong check: does something on the '
-        'way change bytes (flow control, a telnet port)?')
+        WARN, 'WARN: station 1 replies, but each reply has a wrong check: something on the way '
+        'changes bytes. Next: look for flow control, a telnet port and long messages, then for '
+        'noise')
     assert bench.says('link') == (
         WARN, 'WARN: port open, but no reply of 1 of 2 stations arrives whole')
 

@@ -269,9 +269,9 @@ def _link(snapshot: NodeView, width: int) -> Iterator[TextLine]:
         yield from _summary('link', status, width)
         periods = [key for key in status.values if key.startswith(_PERIOD)]
         yield from _table(status.values, [*LINK_KEYS, *periods], width)
-        error = status.values.get('last error', 'none')
-        if error != 'none':
-            yield from _wrapped(f'last error: {error}', width, Style.WARNING)
+        for key in ('last error', 'cause', 'next step'):
+            if (text := status.values.get(key, 'none')) != 'none':
+                yield from _wrapped(f'{key}: {text}', width, Style.WARNING)
     for status in _section(snapshot, 'standby'):
         yield from _summary('standby', status, width)
 

@@ -25,6 +25,8 @@ from abdf1_ros.df1.echo import COMES_BACK
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.odd import DAMAGED
 from abdf1_ros.df1.stations import Station
+from abdf1_ros.diagnosis.causes import diagnose, Diagnosis
+from abdf1_ros.diagnosis.traces import Traces
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.evidence import evidence_of
 from abdf1_ros.pccc.families import FAMILIES
@@ -41,8 +43,7 @@ _SAME_NUMBER_TOLD = 60.0
 _ENOUGH = 256
 _ENOUGH_DAMAGED = 3
 
-SWALLOWED = ('messages have a wrong check, and no byte 11 or 13 hex has come: does flow control '
-             '(XON/XOFF) on the way, as of a device server, swallow them? Set it to none')
+SWALLOWED = str(diagnose(Traces(swallowed=b'\x11\x13')))
 
 # With a second user the foreign replies are at least this number, and this share of all replies.
 _ENOUGH_FOREIGN = 20
@@ -167,11 +168,45 @@ class LineView:
         return SHARED_BY_SPLITTER if is_shown else ''
 
     def evidence_of(self, station: Station) -> str:
+        """Return cause and next step of replies that do not come whole; empty if they do."""
         stations, number = self.driver.stations, station.number
         if not takes_in_silence(station) and not station.takes_no_commands \
                 and stations.other_number(number) is None:
             return ''
-        return str(evidence_of(self.driver.network.line_mode, stations, number))
+        evidence = evidence_of(self.driver.network.line_mode, stations, number)
+        is_shown = (evidence.fault is not None or evidence.is_only_acknowledged
+                    or evidence.other_number is not None and evidence.gateway is None)
+        return str(diagnose(self.traces(station))) if is_shown else ''
+
+    def diagnosis(self, now: float) -> Diagnosis | None:
+        """Return cause and next step of the first station that does not reply, None for none."""
+        if self.why_closed or self.driver.network.line_mode.only_listens:
+            return None
+        for station in self.driver.stations:
+            if not station.active or takes_in_silence(station) or self._comes_and_goes(
+                    station, now):
+                return diagnose(self.traces(station))
+        return None
+
+    def traces(self, station: Station) -> Traces:
+        """Return what the line has shown of a station that does not reply."""
+        driver, counters = self.driver, self.driver.counters
+        network, stations = driver.network, driver.stations
+        evidence = evidence_of(network.line_mode, stations, station.number)
+        other = next((other.number for other in stations
+                      if other.replies and other.active and other is not station), None)
+        is_new = not any(known.last_heard for known in stations)
+        return Traces(
+            network.line_mode, network.checksum, network.station, station.number, evidence.gateway,
+            characters=counters.chars_received if is_new and not driver.machine.echoes else 0,
+            polls=counters.polls_sent, polls_answered=int(station.takes_no_commands),
+            acks=int(takes_in_silence(station)),
+            naks=counters.naks_received if is_new or self.is_refused else 0,
+            echoes=driver.machine.echoes, polled=counters.polls_received > 0,
+            other_number=evidence.other_number, is_acknowledged=evidence.is_only_acknowledged,
+            is_left_alone=evidence.is_left_alone, is_garbled=evidence.fault is not None,
+            was_heard=station.last_heard is not None, neighbour=other,
+            neighbour_answers=None if other is None else True)
 
     def wrong_types(self) -> list[str]:
         """Return a text for each PLC whose family or processor differs from the map."""
@@ -227,5 +262,4 @@ def takes_in_silence(station: Station) -> bool:
 
 def deaf_text(station: int) -> str:
     """Return the text for a station that answers polls, but no commands."""
-    return f'station {station} answers polls, but no command: is Error_Code right, ' \
-        'and Cmd_Timeout long enough?'
+    return diagnose(Traces(station=station, polls_answered=1)).cause

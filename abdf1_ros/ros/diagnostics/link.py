@@ -109,6 +109,7 @@ class LinkStatus:
 
     def values(self, now: float) -> dict[str, str]:
         driver, opener = self._line.driver, self._line.opener
+        found = self._line.diagnosis(now)
         self._rate.update(driver, now)
         return {
             'port': 'closed' if self._line.why_closed else 'open',
@@ -131,6 +132,7 @@ class LinkStatus:
             **period_of(self._seen),
             'files': changed_text(self._seen) or 'as read',
             'last error': with_age(self._seen.last_error, now),
+            **({} if found is None else {'cause': found.cause, 'next step': found.step}),
         }
 
 

@@ -235,15 +235,17 @@ def test_link_shows_load_and_poll_cycle() -> None:
         'link', Style.WARNING, 'WARN: port open', {
             'port': 'open', 'settings': '19200 baud, CRC', 'line load': '61 %',
             'poll cycle with Periods': '240 ms',
-            'period 100 ms': 'wanted 100 ms, kept 345 ms', 'last error': '2509 ERR'})])
+            'period 100 ms': 'wanted 100 ms, kept 345 ms', 'last error': '2509 ERR',
+            'cause': 'noise', 'next step': 'check shield'})])
     assert lines(picture)[1] == '  load 61 %   cycle 240 ms'
     assert styles_of('  link         WARN: port open', picture) == [Style.WARNING] * 2
-    assert lines(picture)[-7:-1] == [
+    assert lines(picture)[-9:-1] == [
         '  link         WARN: port open',
         '      settings                 19200 baud, CRC',
         '      line load                61 %',
         '      poll cycle with Periods  240 ms',
-        '      period 100 ms            wanted 100 ms, kept 345 ms', '      last error: 2509 ERR']
+        '      period 100 ms            wanted 100 ms, kept 345 ms', '      last error: 2509 ERR',
+        '      cause: noise', '      next step: check shield']
     assert line_with('last error: 2509 ERR', picture).style is Style.WARNING
     picture = snapshot(statuses=[ShownStatus('standby', Style.GOOD, 'OK: waits')])
     assert '  standby      OK: waits' in lines(picture)
