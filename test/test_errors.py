@@ -20,6 +20,7 @@ from importlib import import_module
 from inspect import Parameter, signature
 import pickle
 from pkgutil import walk_packages
+from typing import get_type_hints
 
 import abdf1_ros
 from abdf1_ros import errors
@@ -75,13 +76,18 @@ def _example(kind: type[Exception], value: int) -> Exception:
     if issubclass(kind, errors.LinkError) and '__init__' not in vars(kind):
         places = 1 if 'words' in vars(kind) else kind.message.template.count('%')
         return kind(*[value] * places, sent=False, cause=known['Message | None'])
-    try:
-        wanted = signature(kind).parameters.values()
-    except ValueError:  # the constructor of C takes anything
+    if not hasattr(kind.__init__, '__code__'):  # the constructor of C takes anything
         return kind(f'text {value}')
-    return kind(*[known[one.annotation] for one in wanted
-                  if one.kind is Parameter.POSITIONAL_OR_KEYWORD], **{
-        one.name: known[one.annotation] for one in wanted if one.kind is Parameter.KEYWORD_ONLY})
+    types = get_type_hints(kind.__init__)
+
+    def made(one: Parameter) -> object:
+        if one.annotation in known or one.default is not Parameter.empty:
+            return known.get(one.annotation, one.default)
+        return next(iter(types[one.name]))  # of an Enum
+
+    wanted = [*signature(kind).parameters.values()]
+    return kind(*[made(one) for one in wanted if one.kind is Parameter.POSITIONAL_OR_KEYWORD], **{
+        one.name: made(one) for one in wanted if one.kind is Parameter.KEYWORD_ONLY})
 
 
 def test_exceptions_survive_pickling_and_copies() -> None:
