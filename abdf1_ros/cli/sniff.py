@@ -259,7 +259,8 @@ def _bundle(options: argparse.Namespace) -> ReportBundle:
 
 def _timeline(options: argparse.Namespace) -> Timeline:
     from abdf1_ros.cli.sniff_picture import Timeline
-    return Timeline(', '.join(options.files or options.tap or [options.port]), options.anonymous)
+    return Timeline(', '.join(options.files or options.tap or [options.port]), options.anonymous,
+                    options.curves)
 
 
 def _bundle_option(path: str) -> str:
@@ -314,6 +315,9 @@ def parse(args: Sequence[str] | None) -> argparse.Namespace:
                         help='also write the traffic as packets, for Wireshark')
     parser.add_argument('--html', metavar='FILE', type=page_option,
                         help='also draw the line as a timeline with its faults, for a browser')
+    parser.add_argument('--curve', metavar='ADDRESS', dest='curves', action='append', default=[],
+                        help='for --html: also draw the values of an address, such as N7:0 or '
+                             'B3:0/2, in the replies of each station; may be repeated')
     parser.add_argument('--report', metavar='ZIP', type=_bundle_option,
                         help='make a bundle of captures for a report: bytes, words, summary, '
                              'processors, versions')
@@ -342,6 +346,8 @@ def parse(args: Sequence[str] | None) -> argparse.Namespace:
         parser.error('--settings and --conformance are for --report')
     if options.anonymous and not (options.report or options.html):
         parser.error('--anonymous is for --report and --html')
+    if options.curves and (not options.html or options.anonymous):
+        parser.error('--curve is for --html, and not for --anonymous: it shows values')
     _check_outputs(parser, options)
     return options
 

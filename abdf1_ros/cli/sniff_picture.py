@@ -22,12 +22,13 @@ seconds. In a long recording, strips without a fault are only counted.
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
 import math
 
 from abdf1_ros.cli.lanes import Bar, cells, drawing, key, Lane, Look, text_of, write_page
+from abdf1_ros.cli.sniff_curves import HeardCurves
 from abdf1_ros.cli.sniff_report import without_data
 from abdf1_ros.df1.listener import LineKind
 from abdf1_ros.pccc.describe import command_name
@@ -169,7 +170,9 @@ class _Drawing:
 class Timeline:
     """Collect decoded entries, then write the page; ``is_anonymous`` leaves names, values out."""
 
-    def __init__(self, title: str, is_anonymous: bool = False) -> None:
+    def __init__(self, title: str, is_anonymous: bool = False,
+                 curves: Sequence[str] = ()) -> None:
+        """Begin a page, with the curves of some addresses."""
         self._title = 'A recorded DF1 line' if is_anonymous else title
         self._is_anonymous = is_anonymous
         self._recordings: list[_Drawing] = []
@@ -179,6 +182,7 @@ class Timeline:
         self._last: float | None = None  # None in a recording without times
         self._character = 0.0
         self._strip: _Strip | None = None
+        self._curves = HeardCurves(curves) if curves else None
 
     def take(self, chunk: Chunk, baud: int | None, begun: str) -> None:
         """
@@ -201,6 +205,8 @@ class Timeline:
     def add(self, entry: Entry) -> None:
         """Draw an entry."""
         recording = self._recordings[-1]
+        if self._curves:
+            self._curves.add(entry, recording.begun)
         if self._last is None:
             place = begin = float(self._characters)
             self._characters += len(entry.wire)
@@ -289,6 +295,8 @@ class Timeline:
         for recording in self._recordings:
             if recording.moments:
                 yield from _overview(recording)
+        if self._curves:
+            yield from self._curves.parts()
         if self._episodes:
             yield '<h2>Faults</h2>'
             rows = (episode.cells() for episode in self._episodes[:MOST_EPISODES])

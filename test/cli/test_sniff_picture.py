@@ -227,6 +227,31 @@ def test_recordings_one_after_the_other_and_without_times(tmp_path: Path, capsys
             and 'y' in each] == ['15']
 
 
+def test_values_of_addresses_are_curves_where_they_are_asked_for(
+        tmp_path: Path, capsys: Output) -> None:
+    said: Said = []
+    for number in range(20):
+        command = Packet(2, 5, 0x0F, 0, number, bytes.fromhex('A2 04 07 89 00 00'))
+        reply = command.reply(bytes((number, 1, 1 + number // 10, 0)))
+        said += [(0.1 * number, '>', frames.master_frame(2, command.encode(), Checksum.CRC)),
+                 (0.1 * number + .03, '<', frames.message_frame(reply.encode(), Checksum.CRC))]
+    file = capture(tmp_path / 'line.cap', said, exchange(4.0, 30, sts=0x10), exchange(
+        5.0, 31, station=3), silence(6.0), exchange(9.0, 32, station=3))
+    found = drawn(tmp_path, capsys, file, '--curve', 'N7:0', '--curve', 'N7:1/1')
+    path, _ = (each['d'] for tag, each in found.found if tag == 'path')  # of both stations
+    assert len([part for part in path if part in 'ML']) == 20
+    assert 'N7:0: 256 to 275' in found.texts  # little-endian words: 00 01 to 13 01
+    assert {'Station 2', 'Station 3', '14:05:10'} <= {*found.texts}
+    assert any(text.startswith('N7:1/1, 2026-03-01 14:05:10') for text in found.texts)
+    assert '2026-03-01 14:05:14, no value for 4.0 s: no answer' in found.texts
+    assert 'no reply has these values' in drawn(
+        tmp_path, capsys, file, '--curve', 'N9:0').texts
+    for args, told in ((('--curve', 'N7:0'), '--curve is for --html'),
+                       (('--html', str(tmp_path / 'x'), '--curve', 'X7:0'), 'X7:0')):
+        said_now = call(main, capsys, file, *args)
+        assert said_now.status == 2 and told in said_now.err
+
+
 def test_names_are_text_and_nothing_else(tmp_path: Path, capsys: Output) -> None:
     name = EVIL.replace('/', '')
     path = Path(capture(tmp_path / name, exchange(0.1, 1), exchange(9999.0, 2)))

@@ -245,13 +245,7 @@ class ValuePicture:
         if self._left_out and not self._wanted:
             yield (f'<p class="is-odd">and {counted(len(self._left_out), "value")} more: name '
                    'those to draw after the file</p>')
-        yield key(_KEY)
-        stations: defaultdict[str, list[tuple[ValuePlace, _Course]]] = defaultdict(list)
-        for place, course in self._courses.items():
-            stations[place.station].append((place, course))
-        for station, courses in stations.items():
-            yield f'<h2>{f"Station {text_of(station)}" if station else "Values"}</h2>'
-            yield from self._drawings(courses)
+        yield from self.drawings()
         if groups:
             yield '<h2>Gaps</h2>'
             yield cells(('from', 'lasted', 'station', 'values', 'reason'), groups[:MOST_GAPS],
@@ -260,6 +254,16 @@ class ValuePicture:
                 yield '<p>and more</p>'
         yield '<h2>In figures</h2>'
         yield self._table()
+
+    def drawings(self, head: str = 'h2') -> Iterator[str]:
+        """Yield the lanes and curves of each station, below a ``head``."""
+        yield key(_KEY)
+        stations: defaultdict[str, list[tuple[ValuePlace, _Course]]] = defaultdict(list)
+        for place, course in self._courses.items():
+            stations[place.station].append((place, course))
+        for station, courses in stations.items():
+            yield f'<{head}>{f"Station {text_of(station)}" if station else "Values"}</{head}>'
+            yield from self._drawings(courses)
 
     def _drawings(self, found: Sequence[tuple[ValuePlace, _Course]]) -> Iterator[str]:
         lanes = [Lane(place.name, [*self._bars(place, course)]) for place, course in found
