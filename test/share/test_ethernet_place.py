@@ -21,6 +21,8 @@ from contextlib import contextmanager
 from pathlib import Path
 import socket
 import struct
+import subprocess
+import sys
 import threading
 import time
 
@@ -294,3 +296,11 @@ def test_only_an_ethernet_place_has_this_thread() -> None:
     assert [*map(type, made)] == [GuestLine, EthernetPlace]
     for place in made:
         place.stop()
+
+
+def test_nothing_is_imported_for_places_that_are_not_set() -> None:
+    code = ('import sys, abdf1_ros.share.guest_line, abdf1_ros.ports.link_thread\n'
+            'print([name for name in sys.modules if name.startswith(("abdf1_ros.cip", '
+            '"abdf1_ros.ports.clients", "abdf1_ros.share.ethernet"))])')
+    assert subprocess.run([sys.executable, '-c', code], capture_output=True, text=True,
+                          check=True).stdout == '[]\n'

@@ -34,3 +34,14 @@ def test_the_line_is_measured(mode: str) -> None:
     row = run.stdout.splitlines()[-1].split()
     assert row[:3] == [mode, '115200', '1']
     assert row[-1] == '0'  # troubles
+
+
+@pytest.mark.long
+def test_ethernet_place_is_measured() -> None:
+    run = subprocess.run(
+        [sys.executable, str(_HERE / 'ethernet_place.py'), '--reads', '3', '--baud', '115200'],
+        capture_output=True, text=True, timeout=60, check=False)
+    assert run.returncode == 0, run.stdout + run.stderr
+    row = run.stdout.splitlines()[-1].split()
+    assert row[0] == '115200' and len(row) == 7
+    assert all(float(entry) >= float(row[1]) for entry in row[2:6])

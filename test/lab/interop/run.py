@@ -27,6 +27,7 @@ import argparse
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, ExitStack, suppress
 from dataclasses import dataclass, replace
+from functools import partial
 import json
 import os
 from pathlib import Path
@@ -38,7 +39,7 @@ import tempfile
 import threading
 import time
 import tty
-from typing import Any
+from typing import Any, Protocol
 
 _HERE = Path(__file__).resolve().parent
 sys.path[:0] = map(str, Path(__file__).resolve().parents[:4])
@@ -54,7 +55,8 @@ from abdf1_ros.pccc.values import ValueType  # noqa: E402
 from cases import Case, CASES, same, Values  # noqa: E402
 from ethernet import ask, DuplexLine, EthernetPlc, serve  # noqa: E402
 from ours import codec_of, End, NodeEnd, OURS, PlcEnd, Setup, THEIRS, VIA, wanted  # noqa: E402
-from shared import OWN, share, Tally  # noqa: E402
+from shared import crowd, OWN, share, Tally  # noqa: E402
+from support.ethernet_ip import EthernetClient  # noqa: E402
 from support.ros import Process  # noqa: E402
 
 PATIENCE = 60.0  # s for an answer of a player
@@ -194,7 +196,14 @@ class EthernetWords:
         self._plc.close()
 
 
-Partner = Player | Df1dSlave | EthernetWords
+class Partner(Protocol):
+    """What our end exchanges values with; an answer is what ``players/player.py`` describes."""
+
+    def read(self, case: Case) -> dict[str, Any]: ...
+
+    def write(self, case: Case, values: Values) -> dict[str, Any]: ...
+
+    def close(self) -> None: ...
 
 
 @contextmanager
@@ -325,6 +334,60 @@ def through_place(run: Run, mode: str, save: Path | None) -> list[tuple[str, str
         partner = run.reach(f'127.0.0.1:{number}')
         stack.callback(partner.close)
         return [server_case(plc, partner, case) for case in cases]
+
+
+def crowd_at_place(run: Run, mode: str, sessions: int, seconds: float) -> Tally:
+    """Let many sessions of a product reach our PLC at one place of our node."""
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        ends = stack.enter_context(tapped(folder, None))
+        place = f'127.0.0.1:{free_port()}'
+        setup = Setup(run.family, run.check, '', (), folder, mode=mode,
+                      share=f'eip:{place}?station={THEIRS}')
+
+        def reach(name: str) -> Partner:
+            until_open(int(name.rpartition(':')[2]))
+            assert run.reach is not None
+            return run.reach(name)
+
+        return crowd(setup, ends, place, reach, sessions, seconds, stack)
+
+
+class OwnEthernetClient:
+    """A client of our own at an eip: place, byte by byte."""
+
+    def __init__(self, family: PlcType, name: str) -> None:
+        self._family, self._dialect, self._tns = family, dialect_of(family), 0
+        host, _, port = name.rpartition(':')
+        self._client = EthernetClient(host, int(port), is_connected=True)
+
+    def read(self, case: Case) -> dict[str, Any]:
+        """Read."""
+        address, codec = codec_of(case, self._family)
+        answer = self._execute(*self._dialect.read(address, codec.words))
+        if 'error' in answer:
+            return answer
+        values = codec.decode(self._dialect.read_data(address, codec.words, answer['data']))
+        return {'values': values if isinstance(values, str) else list(values)}
+
+    def write(self, case: Case, values: Values) -> dict[str, Any]:
+        """Write whole words."""
+        if '/' in case.address:
+            return {'cannot': 'bits'}
+        address, codec = codec_of(case, self._family)
+        data = codec.encode(wanted(values, codec.type))
+        answer = self._execute(*self._dialect.write(address, data))
+        return answer if 'error' in answer else {'done': True}
+
+    def _execute(self, cmd: int, data: bytes) -> dict[str, Any]:
+        self._tns = self._tns % 0xFFFF + 1
+        reply = self._client.execute(bytes((cmd, 0)) + self._tns.to_bytes(2, 'little') + data)
+        assert reply[2:4] == self._tns.to_bytes(2, 'little')
+        return {'error': f'STS {reply[1]:02X}'} if reply[1] else {'data': reply[4:]}
+
+    def close(self) -> None:
+        """Hang up."""
+        self._client.close()
 
 
 def share_line(run: Run, mode: str, rounds: int) -> Tally:
@@ -527,6 +590,16 @@ def pycomm3_runs(options: argparse.Namespace) -> list[Run]:
             for ours in ('plc', 'node') for check in Checksum]
 
 
+def our_runs(options: argparse.Namespace) -> list[Run]:
+    """Return the runs with a client of our own, for eip: places alone."""
+    return [Run('ourselves', PlcType.SLC, check, 'plc', _needs_place,
+                reach=partial(OwnEthernetClient, PlcType.SLC)) for check in Checksum]
+
+
+def _needs_place(setup: Setup, port: str, stack: ExitStack) -> Partner:
+    raise SystemExit('a client of our own needs --place or --sessions')
+
+
 def node_runs(options: argparse.Namespace) -> list[Run]:
     """Return the runs with node-drivers, for a PLC-5, and nodepccc, for an SLC."""
     reach = {product: ethernet_player('node_client.mjs', options.node, options.modules, product,
@@ -585,8 +658,7 @@ def show(name: str, told: list[tuple[str, str, bool]]) -> bool:
     return all(good for _, _, good in told)
 
 
-def main() -> int:
-    """Carry out the runs with one product."""
+def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--save', type=Path, help='a folder for the captures')
     parser.add_argument('--python', default=sys.executable, help='that has the product')
@@ -597,6 +669,10 @@ def main() -> int:
     parser.add_argument('--only', default='', help='only runs whose name has this in it')
     parser.add_argument('--place', action='store_true',
                         help='let those that speak EtherNet/IP reach our PLC through our node')
+    parser.add_argument('--sessions', metavar='NUMBER', type=int,
+                        help='let so many of them share one such place (16)')
+    parser.add_argument('--seconds', metavar='S', type=float, default=600.0,
+                        help='how long (600)')
     products = parser.add_subparsers(dest='product', required=True)
     products.add_parser('df1py3').set_defaults(runs=df1py3_runs)
     entry = products.add_parser('libpccc')
@@ -612,6 +688,7 @@ def main() -> int:
     entry.set_defaults(runs=advancedhmi_runs)
     entry.add_argument('--assembly', required=True, help='MfgControl.AdvancedHMI.Drivers.dll')
     products.add_parser('pycomm3').set_defaults(runs=pycomm3_runs)
+    products.add_parser('ourselves').set_defaults(runs=our_runs)
     entry = products.add_parser('node')
     entry.set_defaults(runs=node_runs)
     entry.add_argument('--node', default='node', help='Node.js')
@@ -620,7 +697,12 @@ def main() -> int:
     entry.set_defaults(runs=libplctag_runs)
     entry.add_argument('--library', required=True, help='libplctag.so')
     entry.add_argument('--ab-server', help='the program ab_server')
-    options = parser.parse_args()
+    return parser.parse_args()
+
+
+def main() -> int:
+    """Carry out the runs with one product."""
+    options = _options()
     if options.save:
         options.save.mkdir(parents=True, exist_ok=True)
     all_good = True
@@ -630,6 +712,11 @@ def main() -> int:
         if options.place:
             for mode in ('Peer', 'Master', 'Via') if run.ours == 'plc' and run.reach else ():
                 all_good &= show(f'{run.text}, {mode}', through_place(run, mode, options.save))
+        elif options.sessions is not None:
+            for mode in ('Peer', 'Master') if run.ours == 'plc' and run.reach else ():
+                tally = crowd_at_place(run, mode, options.sessions, options.seconds)
+                print(f'{run.text}, {mode}: {tally}', flush=True)
+                all_good &= tally.is_good
         elif options.share is not None:
             for mode in ('Peer', 'Master') if run.ours == 'plc' else ():
                 tally = share_line(run, mode, options.share)

@@ -36,6 +36,7 @@ from ours import BEAT, NodeEnd, PlcEnd, Setup
 
 _GUESTS = Case('N7:0', [0.0] * 60, []), Case('N7:100', [0.0] * 60, [])
 OWN = Case('N7:200', [1, 2, 3, 4], [4112, -1, 16, 0])
+_WORDS = 12  # of a session
 PATIENCE = 10.0  # s until words are written: AbDf1 does not say when
 _LONGEST_BEAT = 1.0  # s between two changes of a heartbeat of 200 ms, on a busy machine
 
@@ -92,26 +93,69 @@ def share(setup: Setup, lines: tuple[str, str], start: Callable[[Setup, str, Exi
     with ThreadPoolExecutor() as pool:
         done = [pool.submit(work, guest, case, plc, rounds) for guest, case in guests]
         watch = pool.submit(_watch, plc, tally, ended)
-        while not all(future.done() for future in done):
-            for values in (OWN.before, OWN.after):
-                node.give(OWN, values)
-                good = same(values, plc.take(OWN, values)) and same(
-                    values, node.take(OWN, values))
-                tally.ours += good * OWN.count
-                tally.wrong_ours += not good
+        _write_own(node, plc, tally, lambda: all(future.done() for future in done))
         ended.set()
     watch.result()
     counts = sum((future.result() for future in done), Counter())
     return replace(tally, **counts)
 
 
-def work(guest: Any, case: Case, plc: PlcEnd, rounds: int) -> Counter[str]:
+def crowd(setup: Setup, lines: tuple[str, str], place: str, reach: Callable[[str], Any],
+          sessions: int, seconds: float, stack: ExitStack) -> Tally:
+    """
+    Let many sessions of a product write and read at one eip: place, each words of its own.
+
+    ``reach`` starts one at the host:port of ``place``. Each rests a second after each round, as
+    the line has time for few.
+    """
+    cases = [Case(f'N7:{_WORDS * number}', [0.0] * _WORDS, []) for number in range(sessions)]
+    plc = PlcEnd(replace(setup, port=lines[1], cases=(*cases, OWN, BEAT)))
+    stack.callback(plc.close)
+    node = NodeEnd(replace(setup, port=lines[0], cases=(OWN,)))
+    stack.callback(node.close)
+    guests = [(reach(place), case) for case in cases]
+    for guest, _ in guests:
+        stack.callback(guest.close)
+    tally, ended = Tally(), Event()
+    end = time.monotonic() + seconds
+    with ThreadPoolExecutor(sessions + 1) as pool:
+        done = [pool.submit(_until, end, guest, case, plc) for guest, case in guests]
+        watch = pool.submit(_watch, plc, tally, ended)
+        _write_own(node, plc, tally, lambda: all(future.done() for future in done))
+        ended.set()
+    watch.result()
+    counts = sum((future.result() for future in done), Counter())
+    return replace(tally, **counts)
+
+
+def _until(end: float, guest: Any, case: Case, plc: PlcEnd) -> Counter[str]:
+    """Do rounds until ``end``."""
+    counts: Counter[str] = Counter()
+    chance = random.Random(case.address)
+    while time.monotonic() < end:
+        counts += work(guest, case, plc, 1, chance)
+        time.sleep(1.0)
+    return counts
+
+
+def _write_own(node: NodeEnd, plc: PlcEnd, tally: Tally, is_over: Callable[[], bool]) -> None:
+    """Let ROS write and read values of its own meanwhile."""
+    while not is_over():
+        for values in (OWN.before, OWN.after):
+            node.give(OWN, values)
+            good = same(values, plc.take(OWN, values)) and same(values, node.take(OWN, values))
+            tally.ours += good * OWN.count
+            tally.wrong_ours += not good
+
+
+def work(guest: Any, case: Case, plc: PlcEnd, rounds: int,
+         chance: random.Random | None = None) -> Counter[str]:
     """
     Write values of chance, look at them in the PLC, and read them again.
 
     A write that comes late, maybe in a later round, is a failure: its words are old or its own.
     """
-    chance = random.Random(case.address)
+    chance = chance or random.Random(case.address)
     counts: Counter[str] = Counter()
     known = [plc.take(case, [])]  # what may stand in the PLC
     for _ in range(rounds):

@@ -35,7 +35,6 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.pccc.families import dialect_of
 from abdf1_ros.pccc.file_types import PlcType
 import pytest
-from support.ethernet_ip import EthernetClient
 from support.ptys import PATIENCE, read_exactly
 
 _HERE = Path(__file__).resolve().parent
@@ -97,24 +96,19 @@ def test_every_value_goes_to_and_fro(run: ModuleType) -> None:
     assert len(told) == len(run.CASES)
 
 
-class ClientOfPlace(Client):
-    """A client of our own at an eip: place, byte by byte."""
-
-    def __init__(self, module: ModuleType, family: PlcType, name: str) -> None:
-        self._codec_of, self._wanted = module.codec_of, module.wanted
-        self._family, self._dialect = family, dialect_of(family)
-        host, port = name.split(':')
-        self._line = EthernetClient(host, int(port), is_connected=True)
-        self._tns = 0
-
-
 @pytest.mark.parametrize('mode', ['Peer', 'Via'])
 def test_every_value_goes_through_an_ethernet_place(run: ModuleType, mode: str) -> None:
-    entry = run.Run('ourselves', PlcType.SLC, Checksum.CRC, 'plc', None,
-                    reach=lambda name: ClientOfPlace(run, PlcType.SLC, name))
+    entry, = (each for each in run.our_runs(None) if each.check is Checksum.CRC)
     told = run.through_place(entry, mode, None)
     assert [entry for entry in told if not entry[2]] == []
     assert len(told) == len(run.CASES)
+
+
+def test_sessions_of_a_place_share_the_line_of_a_node_at_work(run: ModuleType) -> None:
+    entry, _ = run.our_runs(None)
+    tally = run.crowd_at_place(entry, 'Peer', 3, 4.0)
+    assert replace(tally, longest_beat=0.0).is_good and tally.beats > 2, tally
+    assert tally.right >= 3 * 12 and tally.failures == 0
 
 
 def test_two_guests_share_the_line_of_a_node_at_work(run: ModuleType) -> None:
