@@ -41,6 +41,19 @@ def command_form(end: AnsweringEnd) -> None:
     end.finish(command)
 
 
+@case('A command is one that a PLC executes: not each has an error as reply.', 'M 8-2 to 8-4',
+      *_ASKING)
+def command_executed(end: AnsweringEnd) -> None:
+    for _ in range(_MOST_COMMANDS):
+        command = end.next_command()
+        status = end.serve(command.data)[3]
+        end.finish(command)
+        if not status:
+            return
+    raise Failed('a command that the simulated PLC executes (for words that --data does not have '
+                 'it sends an error, too)', f'{_MOST_COMMANDS} errors, the last STS {status:02X}')
+
+
 @case('Each new command has another TNS.', 'M 6-7', *_ASKING)
 def tns_differs(end: AnsweringEnd) -> None:
     seen = []

@@ -100,7 +100,7 @@ Habit = Enum('Habit', [
     'POLLS_LATE', 'SENDS_TWO', 'ONE_REPETITION',
     'ACKS_BAD_REPLY',  # and polls again
     'NAK_BEFORE_COMMAND', 'TAKES_ANY_TNS', 'TAKES_ANY_DESTINATION', 'TAKES_ANY_CODE',
-    'REPEATS_FOR_EVER',
+    'REPEATS_FOR_EVER', 'SENDS_NO_FUNCTION',
     'STOPS_AFTER_10',  # commands
     # Of a radio modem node or client.
     'ACKNOWLEDGES', 'ANSWERS_SYMBOLS', 'REPEATS_AFTER_NAK', 'REPLIES_FOR_OTHERS',
@@ -698,6 +698,8 @@ class _Asker:
             return b''
         sts = 2 if self._wire.has(Habit.STS_IN_COMMAND) else 0
         command = self.with_tns(bytes((1, 5, 0x0F, sts, 0, 0)) + _PLC5_READ)
+        if self._wire.has(Habit.SENDS_NO_FUNCTION):
+            return command[:6] + command[7:]
         return command[:5] if self._wire.has(Habit.TAKES_SHORT) else command
 
     def with_tns(self, command: bytes) -> bytes:
