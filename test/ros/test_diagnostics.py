@@ -333,6 +333,7 @@ def test_number_to_which_a_gateway_replies_is_told_also_where_all_works(
             'replies to its own number. Next: make it our Station: 8 in net.csv, or --own-station '
             '8 of "plc"')
     assert bench.says('link') == (WARN, f'WARN: port open; {told}')
+    assert '. Next: '.join(cause_of(bench)) == told
     assert bench.says('station 1')[0] == OK
     assert [[news.text for watch in watches for news in watch.look(NOW)] for _ in range(2)] == [
         [told], []]
@@ -626,6 +627,12 @@ def test_link_tells_cause_and_next_step_of_a_missing_answer(bench: Bench,
         'station 2 is silent, and station 1 answers: port and settings are right')
     stations.lost(1, NOW)
     assert cause_of(bench)[0] == 'station 1 has answered before, and is silent now'
+    stations[1].replies = 0
+    for _ in range(2):
+        stations.heard(1, NOW)
+        stations.lost(1, NOW)
+    assert cause_of(bench)[0] == (
+        'station 1 answers polls, but no command: is Error_Code right?')
     peer = make_bench('speed,Read,N7:0,1,SLC,1000', mode='Peer')
     peer.driver.stations.lost(1, NOW)
     peer.driver.counters.naks_received = 4

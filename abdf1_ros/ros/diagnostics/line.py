@@ -179,14 +179,17 @@ class LineView:
         return str(diagnose(self.traces(station))) if is_shown else ''
 
     def diagnosis(self, now: float) -> Diagnosis | None:
-        """Return cause and next step of the first station that does not reply, None for none."""
+        """
+        Return cause and next step of the stations that do not reply, None if all reply.
+
+        Of several causes it is the one that says most.
+        """
         if self.why_closed or self.driver.network.line_mode.only_listens:
             return None
-        for station in self.driver.stations:
-            if not station.active or takes_in_silence(station) or self._comes_and_goes(
-                    station, now):
-                return diagnose(self.traces(station))
-        return None
+        found = [diagnose(self.traces(station)) for station in self.driver.stations
+                 if not station.active or takes_in_silence(station)
+                 or self._comes_and_goes(station, now) or self.evidence_of(station)]
+        return min(found, key=lambda each: each.rank, default=None)
 
     def traces(self, station: Station) -> Traces:
         """Return what the line has shown of a station that does not reply."""
