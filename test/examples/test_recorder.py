@@ -22,9 +22,11 @@ import re
 import shlex
 import signal
 
+from abdf1_ros.cli.plc.command import main as plc
 from abdf1_ros.paths import config_file
 from abdf1_ros.settings.map_file import load_mappings
 import pytest
+from support.commands import call, Output
 from support.ros import Observer, Process
 from support.ros_tools import SOURCE
 from support.simulator_process import Files, make_files, READS
@@ -58,7 +60,8 @@ def has_topics(path: Path) -> bool:
         f',{topic},' in path.read_text(encoding='utf-8') for topic in READS)
 
 
-def test_every_read_topic_is_recorded_until_a_signal(bridge: Process, tmp_path: Path) -> None:
+def test_every_read_topic_is_recorded_until_a_signal_and_drawn(
+        bridge: Process, tmp_path: Path, capsys: Output) -> None:
     path = tmp_path / 'line.csv'
     with Observer() as observer, \
             Process(EXAMPLE, str(path), '--node', '/recorded/abdf1') as recorder:
@@ -74,6 +77,10 @@ def test_every_read_topic_is_recorded_until_a_signal(bridge: Process, tmp_path: 
         assert last[topic][2:] == [address, *shown]
         age = datetime.now(UTC) - datetime.fromisoformat(last[topic][0])
         assert timedelta(0) < age < timedelta(minutes=1)
+    said = call(plc, capsys, 'plot', str(path), '--html', str(tmp_path / 'line.html'))
+    assert said.status == 0 and said.err == ''
+    page = (tmp_path / 'line.html').read_text(encoding='utf-8')
+    assert all(f'>{topic}<' in page or f'>{topic}[0]<' in page for topic in READS)
 
 
 def test_it_ends_after_the_time_it_is_given(bridge: Process, tmp_path: Path) -> None:

@@ -30,6 +30,7 @@ from typing import NamedTuple, TextIO
 from abdf1_ros.cli.plc.log_file import COLUMNS, is_end_of_gap
 from abdf1_ros.numbers import decimal_number
 from abdf1_ros.problems import Problem
+from abdf1_ros.sniffer.capture import is_capture_line
 from abdf1_ros.text import shown
 
 _RECORDED = ('time', 'topic', 'address', 'values')
@@ -81,6 +82,8 @@ def samples(path: str, remark: Callable[[str], None]) -> Iterator[Sample]:
         elif first == ','.join(_RECORDED):
             yield from _rows(path, lines, _recorded)
         else:
+            if is_capture_line(first):
+                raise Problem(f'{path}:1', 'bytes, not values: "sniff --html" draws them')
             raise Problem(f'{path}:1', (
                 'is not a CSV or JSON lines of "plc log", nor a CSV of recorder.py: it begins '
                 f'with "{shown(first)}"' if first else 'the file is empty'))

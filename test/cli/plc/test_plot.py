@@ -136,6 +136,10 @@ def test_names_choose_what_is_drawn(tmp_path: Path, capsys: Output) -> None:
                                'speed, ST9:0\n')
 
 
+def test_missing_words_are_named(capsys: Output) -> None:
+    assert 'arguments are required: FILE, --html\n' in call(main, capsys, 'plot').err
+
+
 @pytest.mark.parametrize(('content', 'told'), [
     ('', ':1: the file is empty'), (f'{HEAD}\n', ': has no row below its head'),
     ('time,station,address,value\n', ':1: is not a CSV or JSON lines of "plc log", nor a CSV of '
@@ -147,6 +151,7 @@ def test_names_choose_what_is_drawn(tmp_path: Path, capsys: Output) -> None:
     (f'{HEAD}\n2026-03-01T14:05+01:00,1,N7:0,,5,\n01.03.26,1,N7:0,,5,\n', ':3: this row cannot'),
     (f'{HEAD}\n2026-03-01T14:05+01:00;1;N7:0;;5;\n', ':2: this row cannot be read: it has 1 col'),
     ('{"time": "2026-03-01T14:05+01:00", "value": 1}\n', ":1: this row cannot be read: 'station'"),
+    ('# abdf1_ros capture 1\n', ':1: bytes, not values: "sniff --html" draws them'),
     ('time,topic,address,values\n1,2\n', ':2: this row cannot be read: it has 2 columns')])
 def test_other_file_is_refused(tmp_path: Path, capsys: Output, content: str, told: str) -> None:
     (tmp_path / 'x').write_text(content, encoding='latin-1')

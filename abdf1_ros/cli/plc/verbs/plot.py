@@ -40,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments."""
     parser.add_argument('file', metavar='FILE', type=expanded,
                         help='a CSV or JSON lines of "plc log", or a CSV of recorder.py')
-    parser.add_argument('names', metavar='NAME', nargs='*',
+    parser.add_argument('names', metavar='NAME', nargs='*', default=[],
                         help='tags and addresses to draw (default: all)')
     parser.add_argument('--html', metavar='OUT', type=page_option, required=True,
                         help='the page, new or of an earlier --html')
