@@ -29,10 +29,10 @@ commands of guests that wait                        ``guests.Guest.waiting``
 calls that wait for a read                          ``reads.demands.ReadCalls.waiting``
 until when a command may be sent                    ``job_tasks.Job.expires``
 commands of jobs under way                          ``job_tasks.JobTasks``
-when an own row has to be looked at                 its ``due``; the first of a PLC in ``Plc.due``
+when an own row has to be looked at                 its ``look``; ``interlocks.plc.Looks`` keep it
 how a PLC answers our own writes, a change to RUN   ``interlocks.plc.Plc``
-last message of a topic, executor, the end          ``interlocks.plc.Conditions``
-whether a topic has more than one publisher         ``interlocks.plc.Conditions``
+last message of a topic, executor, the end          ``interlocks.own.Conditions``
+whether a topic has more than one publisher         ``interlocks.own.Conditions``
 mode and type of a PLC                              ``checks.Checks.known``
 whether a station answers                           ``df1.stations.Station``
 last value, freshness, withheld                     ``reads.point.ReadPoint``
@@ -289,7 +289,7 @@ class Driver:
     def next_expiry(self) -> float:
         """Return when ``expire`` has work (clock value in s), infinite for never."""
         due = min(self._writes.next_expiry, self.tasks.next_expiry, self.guests.next_expiry,
-                  self.interlocks.ours.due, self._demands.next_expiry)
+                  self.interlocks.ours.looks.first, self._demands.next_expiry)
         return min(due, self._flights.next_expiry) if self._flights.unread else due
 
     def _gateway_replied(self, number: int) -> None:

@@ -170,17 +170,10 @@ class WordsListener(Protocol):
 
 
 class Words:
-    """
-    The words of a row, and the flights that may have changed them.
-
-    ``again_at`` (clock value, s) is when our value is written a second time, since no other write
-    can land any more then (rule 10).
-    """
+    """The words of a row, and the flights that may have changed them."""
 
     def __init__(self, row: Mapping, flights: Flights) -> None:
         self.row = row
-        self.again_at = math.inf
-        self._latest = math.inf  # latest ``again_at``, finite only at the end
         self._flights = flights
         self.flights: list[Flight] = []  # in the order in which they began
 
@@ -229,37 +222,44 @@ class Words:
             one.lands_until for one in self.flights
             if one is not last and not _continues(last, one, self.row))])
 
-    def plan_again(self, tried: float) -> None:
-        """Plan a second write of the value sent at ``tried`` (s) if a write may land later."""
-        until = min(self.lands_until, self._latest)
-        self.again_at = until if tried < until else math.inf
+    def again_at(self, ended: float = math.inf) -> float:
+        """
+        Return when our confirmed value is to be written a second time, infinite for never.
 
-    def earlier_may_land(self) -> None:
-        """Plan a second write if one from before the port was opened may have landed since."""
+        Then no write that was under way before can land any more (rule 10). It is not later than a
+        second after the end of the bridge has begun, at ``ended`` (clock values, s).
+        """
         last = self.last
-        if last is None or last.begun < self._flights.opened_until:
-            self.again_at = min(self.again_at, self._flights.opened_until, self._latest)
+        if last is None:
+            return math.inf
+        until = min(self._lands([one for one in self.flights if one.done <= last.done]),
+                    ended + _SETTLE_AT_END)
+        return until if until > last.begun else math.inf
 
-    def try_again(self, when: float, now: float) -> None:
-        """Plan another write after a failed one, unless a second write is planned (rule 10)."""
-        if not now < self.again_at < math.inf:
-            self.again_at = when
-
-    def end(self, now: float) -> None:
-        """Bound the time of a second write: the bridge ends."""
-        self._latest = now + _SETTLE_AT_END
-
-    def resume(self) -> None:
-        """Remove the bound of ``end``: the bridge goes on."""
-        self._latest = math.inf
+    def are_ours(self, but: Flight | None = None) -> bool:
+        """Tell whether our write was confirmed, and no message came after it ``but`` this one."""
+        last = self._last_but(but)
+        return last is not None and last.write is not None and last.write.is_own and not any(
+            one.is_message_of(self.row) and one.has_changed and one.begun >= last.begun
+            for one in self.flights if one is not but)
 
     @property
     def are_guests(self) -> bool:
         """Tell whether these words may have a guest's value."""
+        return self._guest_done(is_known=True) > -math.inf
+
+    @property
+    def guest_somewhere(self) -> float:
+        """Return when a guest wrote unknown words last, maybe these (s); -inf for not since."""
+        return self._guest_done(is_known=False)
+
+    def _guest_done(self, *, is_known: bool) -> float:
+        """Return when a guest's last write ended since the last confirmed one of the row began."""
         last = self.last
         begun = last.begun if last is not None else -math.inf
-        return any(one.write is None and one.extents is not None and one.has_changed
-                   and one.done > begun for one in self.flights)
+        return max((one.done for one in self.flights
+                    if one.write is None and (one.extents is not None) is is_known
+                    and one.has_changed and one.done > begun), default=-math.inf)
 
     def may_hold(self, value: int) -> bool:
         """Tell whether ``value`` is ours and these words may have it."""
@@ -269,11 +269,13 @@ class Words:
     @property
     def lands_until(self) -> float:
         """Return until when another value than the confirmed one may land (clock value in s)."""
-        if not self._flights.may_begin(self.row):
-            return math.inf
+        return self._lands(self.flights) if self._flights.may_begin(self.row) else math.inf
+
+    def _lands(self, flights: Sequence[Flight]) -> float:
+        """Return until when another value than the confirmed one may land from these flights."""
         last = self.last
         begun, stands = (-math.inf, ()) if last is None else (last.begun, last.source(self.row))
-        found = [one.lands_until for one in self.flights
+        found = [one.lands_until for one in flights
                  if one.has_changed and one.concerns(self.row) and one.lands_until > begun
                  and one.source(self.row) != stands]
         if self._flights.has_gateway(self.row) and self._flights.opened_until > begun:

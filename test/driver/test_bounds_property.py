@@ -491,7 +491,7 @@ def test_rule_10_second_writes_and_heartbeats_take_turns_on_a_full_line() -> Non
         plc.faults.delay, bound.losses.is_due = 0.45, True
     bound.bench.run(40.0)
     assert max(bound.gaps.values()) < 6.96  # the preset
-    assert {row.words.again_at for row in bound.bench.driver.interlocks.fallbacks} == {math.inf}
+    assert {row.again_at for row in bound.bench.driver.interlocks.fallbacks} == {math.inf}
 
 
 @pytest.mark.parametrize('mode', ['Message', 'Standard', 'Peer'])

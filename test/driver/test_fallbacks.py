@@ -22,13 +22,12 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave
 from abdf1_ros.df1.stations import ActiveStationList
-from abdf1_ros.driver.flights import Flight, Flights
+from abdf1_ros.driver.flights import Flight, Flights, Words
 from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackRow, FallbackState
-from abdf1_ros.driver.interlocks.heartbeat import HeartbeatRow
-from abdf1_ros.driver.interlocks.plc import Conditions, Plc
+from abdf1_ros.driver.interlocks.own import Conditions
+from abdf1_ros.driver.interlocks.plc import Plc
 from abdf1_ros.driver.write import Outcome, Write
 from abdf1_ros.driver.writes.queue import WriteQueue
-from abdf1_ros.errors import CommandTimeout
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.emulated import EmulatedProcessor, Setting
 from abdf1_ros.pccc.identity import Mode
@@ -55,40 +54,7 @@ from support.interlocks import (
     TIMEOUT,
 )
 from support.mappings import make_mapping
-
-
-class OneRow(StillClock):
-    """A row with Fallback by itself, and writes of it that end as they are told."""
-
-    def __init__(self, cmd_timeout: float = 0.5) -> None:
-        super().__init__()
-        self.mapping = speed_row()
-        self.flights = Flights(self, 2 * cmd_timeout, ActiveStationList())
-        self.row = FallbackRow(self.flights.words_of(self.mapping))
-
-    def message(self, begun: float, done: float, outcome: Outcome) -> None:
-        """Let a message end that was published when it began."""
-        flight = self._write(Write(self.mapping, [3], begun), done, outcome)
-        self.row.write_ended(flight, done)
-
-    def fallback(self, write: Write, done: float, outcome: Outcome = Outcome.WRITTEN
-                 ) -> float | None:
-        self._write(write, done, outcome)
-        return self.row.ended(outcome, done)
-
-    def guest(self, now: float) -> None:
-        self.now = now
-        flight = self.flights.begin(1, [self.mapping.extent])
-        self.flights.ended(flight, Outcome.WRITTEN)
-        self.row.write_ended(flight, now)
-
-    def _write(self, write: Write, done: float, outcome: Outcome) -> Flight:
-        self.now = write.requested
-        flight = self.flights.begin(1, [self.mapping.extent], write)
-        self.now = done
-        lost = CommandTimeout() if outcome is Outcome.PARTLY else None
-        self.flights.ended(flight, outcome, lost)
-        return flight
+from support.own_rows import OneBeat, OneRow
 
 
 @pytest.mark.parametrize(('begun', 'again'), [(1.5, 2.0), (2.0, math.inf)])
@@ -98,9 +64,9 @@ def test_rule_10_write_that_may_land_after_the_begin_of_a_fallback_has_it_writte
     one.message(0.5, 1.0, Outcome.UNKNOWN)  # may land until 2.0
     one.row.make_due(FallbackCause.TIMEOUT, begun)
     one.fallback(one.row.take(begun), begun + 1.0)
-    assert one.row.words.again_at == again
+    assert one.row.again_at == again
     assert one.row.is_confirmed is (again == math.inf)
-    assert one.row.judge(begun + 1.0, -math.inf) is (again < math.inf)
+    assert one.is_due(begun + 1.0) is (again < math.inf)
 
 
 @for_all(('is_guests', 'now', 'until'), [
@@ -166,31 +132,33 @@ def test_rule_10_write_that_ends_with_the_port_may_land_for_its_time_from_then_o
 @pytest.mark.parametrize(('processor', 'again'), [('ML1000', 1.0), ('5/03', math.inf)])
 def test_rule_10_word_that_may_be_written_back_late_has_old_values_of_other_bits(
         processor: str, again: float) -> None:
-    flights = Flights(StillClock(), 1.0, ActiveStationList())
+    flights = Flights(clock := StillClock(), 1.0, ActiveStationList())
     row, other = (make_mapping(f'B3:0/{bit}', 'Write', plc='SLC', processor=processor)
                   for bit in range(2))
     words, flight = flights.words_of(row), flights.begin(1, [other.extent], Write(other, [1], 0.0))
     flights.ended(flight, Outcome.UNKNOWN)
-    words.plan_again(0.5)
-    assert words.again_at == again
+    clock.now = 0.5
+    ours = flights.begin(1, [row.extent], Write(row, [0], 0.5, is_own=True))
+    flights.ended(ours, Outcome.WRITTEN)
+    assert words.again_at() == again
 
 
 def test_rule_11_only_the_first_try_over_a_guest_is_not_held_up_by_a_pause() -> None:
     row = (one := OneRow()).row
     row.make_due(FallbackCause.START, 0.0)
-    assert row.first_due == 0.0
+    assert one.is_due(0.0) and row.is_first_try
     one.fallback(row.take(0.0), 0.1)
     one.guest(1.0)
-    assert row.judge(1.0, -math.inf) and row.first_due == 1.0
-    again = row.refresh(1.0)
-    assert not row.judge(1.1, -math.inf)
+    assert one.is_due(1.0) and row.is_first_try
+    one.begin(again := row.refresh(1.0))
+    assert not one.is_due(1.1)
     one.fallback(again, 1.2, Outcome.UNKNOWN)
-    assert row.judge(1.2, -math.inf) and row.first_due == math.inf
-    again = row.refresh(2.0)
+    assert one.is_due(1.2) and not row.is_first_try
+    one.begin(again := row.refresh(2.0))
     row.make_due(FallbackCause.RUN, 2.1)  # a new PLC, maybe: what went out before is no answer
     assert one.fallback(again, 2.2) is None and row.why_held
     assert one.fallback(row.take(2.3), 2.4, Outcome.PARTLY) is None
-    assert not row.judge(2.5, -math.inf)  # after a refusal there is a pause
+    assert not one.is_due(2.5)  # after a refusal there is a pause
 
 
 def test_rule_11_answered_write_of_a_guest_ends_the_pause() -> None:
@@ -205,10 +173,11 @@ def test_rule_11_answered_write_of_a_guest_ends_the_pause() -> None:
     one.row.make_due(FallbackCause.START, 0.0)
     own = one.row.take(0.0)
     one.fallback(own, 0.1, Outcome.UNKNOWN)
-    plc.plan()
+    plc.look_again()
     for _ in range(2):
         ended(0.1, Outcome.UNKNOWN, own)
     assert plc.rank(one.row, 0.2) is None
+    assert plc.ready({}, 0.2) == [one.row]
     assert plc.next_due(math.inf) == 1.1
     ended(0.2, Outcome.WRITTEN)
     assert plc.next_due(math.inf) < 0.2
@@ -217,7 +186,6 @@ def test_rule_11_answered_write_of_a_guest_ends_the_pause() -> None:
         ended(0.3, Outcome.UNKNOWN, write)  # nor is one of a guest or a message
     assert plc.rank(one.row, 0.3) is not None
     one.fallback(one.row.take(0.4), 0.5)
-    plc.plan()
     plc.pause_end = 9.0
     one.row.make_due(FallbackCause.RUN, 1.0)
     plc.look_again(one.row)
@@ -228,9 +196,10 @@ def test_rule_5_waiting_row_of_a_silent_plc_hides_no_earlier_time() -> None:
     one, stations = OneRow(), ActiveStationList([1], probe_time=1.0)
     plc = Plc(1, [one.row], stations, one.flights, Conditions(ended=0.0))
     stations.lost(1, 0.0)
-    plc.due = 1.0
+    plc.look_again()
+    one.begin(one.row.take(1.0))
+    plc.begins(one.row)
     assert plc.next_due(2.0) == 2.0
-    one.row.take(1.0)
     assert plc.rank(one.row, 1.0) is None  # that was its try
 
 
@@ -262,8 +231,9 @@ def test_rule_11_first_tries_go_first_then_plcs_that_answer() -> None:
     assert plc.rank(one.row, 90.0) == (3, False, 3, 5.0)
     stations.heard(1, 91.0)
     plc.failures = 0
+    one.now = 91.0
+    one.flights.ended(one.flights.begin(1, None), Outcome.UNKNOWN)  # it may land until 92.0
     one.fallback(one.row.take(91.0), 91.1)
-    one.row.words.again_at = 92.0
     for conditions.gave_way, conditions.is_beats_turn, least in (
             (91.5, False, 92.0), (92.5, False, 92.5), (92.5, True, 93.0)):
         assert plc.rank(one.row, 93.0) == (2, least, 91.0)
@@ -286,11 +256,11 @@ def test_rule_7_time_of_a_message_after_an_unconfirmed_fallback_counts_once() ->
     one.fallback(one.row.take(1.0), 1.5, Outcome.UNKNOWN)
     for begun in 2.0, 2.2:
         one.message(begun, begun + 0.1, Outcome.UNKNOWN)
-    assert [one.row.judge(2.0 + AFTER + late, -math.inf) for late in (-0.1, 0.0)] == [False, True]
+    assert [one.is_due(2.0 + AFTER + late) for late in (-0.1, 0.0)] == [False, True]
     one.fallback(one.row.take(2.5), 2.6, Outcome.UNKNOWN)
     for begun, outcome in (2.7, Outcome.UNKNOWN), (2.8, Outcome.WRITTEN):
         one.message(begun, begun, outcome)
-    assert one.row.judge(2.8, -math.inf)  # not later over a message of a PLC that is well again
+    assert one.is_due(2.8)  # not later over a message of a PLC that is well again
 
 
 @pytest.mark.parametrize('gap', [0.1, 0.002])  # s; slower, and faster, than transactions are
@@ -309,10 +279,10 @@ def test_rule_7_fallback_waits_for_a_message_that_waits() -> None:
     cell, speed = speed_cell()
     cell.publish(speed, 3, run=0.1)
     plc, (row,) = cell.bench.driver.interlocks.plcs[1], cell.bench.driver.interlocks.fallbacks
-    row.due = due = row.refreshed + AFTER
+    due = row.refreshed + AFTER
     assert plc.ready({speed: due - 0.1}, due) == []
-    assert row.due == due - 0.1 + AFTER
-    row.due = due
+    assert plc.next_due(math.inf) == due - 0.1 + AFTER
+    plc.look_again()
     assert plc.ready({}, due) == [row]
 
 
@@ -381,17 +351,17 @@ def test_rule_8_end_of_a_fault_is_a_change_to_run(monkeypatch: pytest.MonkeyPatc
 def test_rule_8_change_to_run_while_a_fallback_is_under_way_has_it_written_again() -> None:
     row = (one := OneRow()).row
     row.make_due(FallbackCause.START, 0.0)
-    write = row.take(1.0)
+    one.begin(write := row.take(1.0))
     row.make_due(FallbackCause.RUN, 2.0)  # between two packets
     one.fallback(write, 3.0)
-    assert row.cause is FallbackCause.START and row.judge(3.0, -math.inf)
+    assert row.cause is FallbackCause.START and one.is_due(3.0)
     row.make_due(FallbackCause.RUN, 3.1)  # none is under way: it is due since 2.0 all the same
-    write = row.take(3.2)
+    one.begin(write := row.take(3.2))
     one.guest(3.5)
     assert one.fallback(write, 4.0) == 2.0
     assert row.state is FallbackState.OVERWRITTEN
     one.fallback(row.refresh(4.0), 4.1, Outcome.FAILED)
-    assert [row.judge(now, -math.inf) for now in (5.0, 5.1)] == [False, True]
+    assert [one.is_due(now) for now in (5.0, 5.1)] == [False, True]
 
 
 def test_rule_2_message_before_the_last_fallback_makes_no_row_fresh() -> None:
@@ -478,8 +448,9 @@ def test_rule_8_earliest_fallback_that_stands_of_a_station_that_is_not_busy_goes
     line.run(4.0)
     interlocks = line.driver.interlocks
     for number, row in enumerate(interlocks.fallbacks, 1):
-        row.refresh_at -= number
-        interlocks.plcs[number].plan_refresh(row)
+        assert row.trial is not None
+        row.trial.done -= number
+        interlocks.plcs[number].look_again(row)
     first, second = (interlocks.refresh(9.0, busy) for busy in ({3}, set()))
     assert first is not None and first.station == 2
     assert second is not None and second.station == 3
@@ -503,9 +474,11 @@ def test_rule_8_fallback_that_stands_is_put_off(
         stations.lost(1, 2.0)
     stations[1].overdue = 2 * (event == 'late replies')
     youngest = {one.mapping: 5.0} if 'message' in event else {}
+    plc.look_again()
     due = row.refresh_at
     assert plc.to_refresh(youngest, due + 0.25) is (None if waits else row)
-    assert row.refresh_at == (due + 0.25 + put_off if waits else due)
+    if waits:
+        assert plc.refreshes.first == due + 0.25 + put_off
 
 
 def test_rule_8_message_that_is_lost_with_the_port_is_not_waited_for() -> None:
@@ -519,7 +492,7 @@ def test_rule_8_message_that_is_lost_with_the_port_is_not_waited_for() -> None:
     cell.bench.write(recipe, [1] * 150)
     cell.bench.write(speed, [4])  # waits
     cell.run(0.1)
-    assert row.judge(cell.now, cell.now) is False  # it is waited for
+    assert row.look(cell.now, cell.now) > cell.now  # it is waited for
     cell.bench.lose_port()
     cell.bench.far.hear = hear
     cell.bench.open(run=row.refreshed + 5.0 - cell.now - 0.05)
@@ -572,14 +545,15 @@ def test_rule_9_write_of_another_row_to_the_same_words_holds_up_for_its_own_time
 
 def test_rule_9_fallbacks_that_became_due_during_a_write_follow_it_together() -> None:
     flights = (one := OneRow()).flights
-    rows = [one.row, FallbackRow(flights.words_of(speed_row(address='N7:1')))]
+    rows = [one.row, FallbackRow(flights.words_of(speed_row(address='N7:1')), Conditions())]
     plc = Plc(1, rows, ActiveStationList([1], probe_time=1.0), flights, Conditions())
     flight = flights.begin(1, [make_mapping('N7:0', length=2).extent])
     for now, row in enumerate(rows):
         row.make_due(FallbackCause.TIMEOUT, now)
+        plc.look_again(row)
         assert plc.ready({}, now) == []
     flights.ended(flight, Outcome.WRITTEN)
-    plc.release()
+    plc.look_again()
     assert plc.ready({}, 2.0) == rows
 
 
@@ -666,61 +640,57 @@ def test_rule_10_once_more_after_a_message_that_may_have_been_written(
     one = OneRow()
     row = one.row
     one.message(1.0, done, outcome)
-    assert row.judge(2.0, -math.inf)
+    assert one.is_due(2.0)
     assert one.fallback(row.take(2.0), 2.1) is not None
-    assert row.judge(2.8, -math.inf) is False
-    assert row.judge(2.9, -math.inf) is again  # 2 x Cmd_Timeout after the message ended
-    assert row.judge(60.0, -math.inf) is again
+    assert one.is_due(2.8) is False
+    assert one.is_due(2.9) is again  # 2 x Cmd_Timeout after the message ended
+    assert one.is_due(60.0) is again
 
 
 @for_all(('is_known', 'done', 'is_again'), [  # the words of its command; others are hardly these
     (True, 0.1, True), (False, 0.1, False), (True, 0.0, False)])  # 0.0: ours began just after it
 def test_rule_8_0_that_a_guest_may_have_written_over_meanwhile_is_written_once_more(
         is_known: bool, done: float, is_again: bool) -> None:
-    words = OneRow().flights.words_of(beat_row())
-    beat = HeartbeatRow(words, 1, Random(0))
+    beat = (one := OneBeat()).beat
     beat.begin(0.0, is_new=True)
-    ours = Flight(1, [words.row.extent], beat.take(0.0), 0.0)
-    guest = Flight(1, ours.extents if is_known else None)
+    one.begin(0.0)
+    guest = Flight(1, [one.mapping.extent] if is_known else None)
     guest.end(Outcome.UNKNOWN, done, 1.0)
-    words.ended(guest)
-    ours.end(Outcome.WRITTEN, 0.2, 0.0)
-    words.ended(ours)
-    beat.ended(Outcome.WRITTEN, 0.2)
-    assert beat.judge(0.2, '', 0.2, {}) is is_again
+    beat.words.ended(guest)
+    one.end(0.2)
+    assert one.is_due(0.2) is is_again
     assert beat.is_first_try is is_again
 
 
 def test_rule_10_heartbeat_counts_after_a_0_that_is_written_once_more() -> None:
-    beat = HeartbeatRow(OneRow().flights.words_of(beat_row()), 1, Random(0))
-    beat.begin(0.0, is_new=True)
-    for now, outcome in ((0.0, Outcome.WRITTEN), (0.3, Outcome.UNKNOWN), (0.5, Outcome.WRITTEN)):
-        assert beat.judge(now, '', now, {})
-        assert beat.take(now).value == '[0]'
-        beat.ended(outcome, now + 0.1)
-        beat.words.try_again(0.3 if now < 0.3 else math.inf, now + 0.1)
-    assert not beat.read_back(5, 0.59, 0.7)  # that read began before the 0 was confirmed
-    assert not beat.judge(1.0, '', 1.0, {})  # the 0 stands for half a second
-    assert beat.judge(1.15, '', 1.15, {})
-    assert (beat.take(1.15).value, beat.tries) == ('[1]', 4)
-    assert not beat.judge(9.0, '', 9.0, {})  # under way
-    beat.ended(Outcome.WRITTEN, 9.0)
+    beat = (one := OneBeat()).beat
+    one.flights.ended(one.flights.begin(1, None), Outcome.UNKNOWN)  # it may land until 1.0
+    beat.begin(0.1, is_new=True)
+    for now, outcome in ((0.1, Outcome.WRITTEN), (1.0, Outcome.UNKNOWN), (1.2, Outcome.WRITTEN)):
+        assert one.is_due(now, 'not yet')
+        assert one.begin(now).value == '[0]'
+        one.end(now + 0.1, outcome)
+    assert not beat.read_back(5, 1.29, 1.4)  # that read began before the 0 was confirmed
+    assert not one.is_due(1.7)  # the 0 stands for half a second
+    assert one.is_due(1.85)
+    assert one.begin(1.85).value == '[1]' and beat.tries == 4
+    assert not one.is_due(9.0)  # under way
+    one.end(9.0)
     assert beat.read_back(5, 9.0, 9.0).endswith('probably a download')
-    beat.take(9.0)
-    beat.ended(Outcome.WRITTEN, 9.0)
-    assert beat.next_beat == 9.0 + 0.5 + 0.2 * Random(0).randint(1, 7)  # unlike another bridge
+    one.begin(9.0)
+    one.end(9.0)
+    assert one.look(9.0) == 9.0 + 0.5 + 0.2 * Random(0).randint(1, 7)  # unlike another bridge
 
 
 def test_rule_10_0_is_written_once_more_also_where_the_heartbeat_may_count_by_then() -> None:
-    one = OneRow(cmd_timeout=1.0)
-    beat = HeartbeatRow(one.flights.words_of(beat_row(5000)), 1, Random(0))
+    one = OneBeat(5000, cmd_timeout=1.0)
+    one.beat.begin(0.0, is_new=True)
     for begun, why in (0.0, ''), (5.2, ''), (6.0, 'no message'):  # 0, a number, and 0 again
-        assert beat.judge(begun, why, begun, {})
-        beat.take(begun)
-        one.now = begun
+        assert one.is_due(begun, why)
+        one.begin(begun)
         one.flights.ended(one.flights.begin(1, None), Outcome.UNKNOWN)  # may land for 2 s
-        beat.ended(Outcome.WRITTEN, begun + 0.1)
-    assert [beat.judge(now, '', now, {}) for now in (6.5, 7.9, 8.0)] == [False, False, True]
+        one.end(begun + 0.1)
+    assert [one.is_due(now) for now in (6.5, 7.9, 8.0)] == [False, False, True]
 
 
 def test_rule_10_why_the_plc_refuses_is_told_once() -> None:
@@ -768,14 +738,19 @@ def test_rule_8_messages_go_before_fallbacks_that_stand_where_nothing_is_read() 
     assert bench.listener.outcomes()[14:] == [Outcome.WRITTEN] * 9
 
 
-def test_rule_8_packets_of_a_fallback_that_stands_wait_for_reads_in_most_cases() -> None:
+def test_rule_8_packets_of_a_fallback_that_stands_wait_for_reads_in_most_cases(
+        monkeypatch: pytest.MonkeyPatch) -> None:
     lamps = make_mapping('B3:0/0', 'Write', plc='SLC', length=320,
                          fallback=Fallback((0,) * 320, 2000))
     bench = DriverBench([lamps, make_mapping('B3:99', plc='SLC', period=0)])
     bench.plc(1, 'SLC', ('B3:0', 100))
     row, = bench.driver.interlocks.fallbacks
+
+    def again(words: Words, ended: float) -> float:
+        return 0.0 if row.is_under_way else math.inf
+
     for begin, reads in ((lambda: None), 18), ((lambda: bench.write(lamps, [1] * 320)), 2), (
-            (lambda: setattr(row.words, 'again_at', bench.clock())), 2):
+            (lambda: monkeypatch.setattr(Words, 'again_at', again)), 2):
         bench.run_until(lambda: row.stands and row.is_under_way)
         count = len(bench.listener.reads)
         begin()
@@ -789,14 +764,13 @@ def test_rule_10_refresh_is_not_the_second_write(outcome: Outcome, next_refresh:
     one = OneRow(cmd_timeout=4.0)
     row = one.row
     one.message(1.0, 2.0, Outcome.UNKNOWN)
-    assert row.judge(2.0, -math.inf)
+    assert one.is_due(2.0)
     one.fallback(row.take(2.0), 2.0)
     one.fallback(row.refresh(7.0), 7.0, outcome)
-    assert not row.judge(7.0, -math.inf)
-    assert row.due == 10.0
+    assert row.look(7.0, -math.inf) == 10.0
     assert row.refresh_at == next_refresh
     one.fallback(row.take(10.0), 10.5, Outcome.UNKNOWN)  # nor is it tried all the time
-    assert (row.judge(10.5, -math.inf), row.due) == (False, 11.5)
+    assert row.look(10.5, -math.inf) == 11.5
 
 
 def test_rule_10_first_try_is_not_held_up_by_the_pause_of_another_row() -> None:

@@ -36,6 +36,7 @@ import pytest
 from support.driver_bench import DriverBench, store
 from support.interlocks import AFTER, beat_row, Cell, FALLBACK, Line, speed_row, START
 from support.mappings import make_mapping
+from support.own_rows import OneBeat
 
 
 @pytest.mark.parametrize('polling', POLLING_MODES)
@@ -57,9 +58,10 @@ def test_rule_1_nothing_is_kept_of_beats_that_have_been_written() -> None:
 
 
 def test_rule_1_counts_to_32767_and_begins_again_with_1() -> None:
-    cell = Cell(beat_row(), run=0.5)
+    cell = Cell(beat_row(), run=1.0)
     beat = cell.bench.driver.interlocks.heartbeats[0]
-    beat.value = LARGEST - 1
+    assert beat.trial is not None
+    beat.trial.write = Write(beat.mapping, [LARGEST - 1], cell.now, is_own=True)
     store(cell.plc, 'N10:0', [beat.value])
     since = cell.now
     cell.run(0.7)
@@ -145,7 +147,7 @@ def test_rule_3d_topic_that_falls_silent_is_0_at_once_though_the_executor_stands
     cell.run(lapses - cell.now - 0.01)
     beat, = cell.bench.driver.interlocks.heartbeats
     assert cell.word('N10:0') and beat.reason == 'the executor of the node stands still'
-    assert beat.due <= beat.first_due == lapses  # or nothing would happen, again and again
+    assert beat.look(cell.now, '') <= beat.topics_until == lapses  # or nothing would happen
     cell.run(0.05)
     assert cell.word('N10:0') == 0
 
@@ -179,7 +181,8 @@ def test_rule_3_beat_is_not_sent_when_it_may_be_wrong_by_then() -> None:
         """Return until when a beat may be sent that is due now."""
         interlocks.executor_ran(executor)
         interlocks.conditions.messages['speed'] = message
-        beat.next_beat = now
+        assert beat.trial is not None
+        beat.trial.begun = now - 2.0
         interlocks.plcs[1].look_again(beat)
         interlocks.beats_gave_way()
         own = interlocks.next(now)
@@ -416,20 +419,21 @@ def test_rule_19_second_foreign_value_is_one_within_a_minute_or_20_periods() -> 
         zeros = {other.next_zero() / period for _ in range(9)}
         assert len(zeros) == 9 and 0.5 <= min(zeros) < max(zeros) < 1.5
         other.differ()
-        assert [other.take_extra_zero() >= period, other.take_extra_zero()] == [True, 0.0]
+        assert other.extra_zero >= period
 
 
 def test_rule_19_0_that_stays_is_written_at_the_end_and_repeated_like_any_other() -> None:
-    beat, = Cell(beat_row(60_000), start=False).bench.driver.interlocks.heartbeats
+    beat = (one := OneBeat(60_000)).beat
+    beat.begin(0.0)
     for now in (0.0, 2.0, 4.0):
-        beat.take(now)
-        beat.ended(Outcome.WRITTEN, now)
+        one.begin(now)
+        one.end(now)
         beat.read_back(5, now, now)
     beat.end(5.0)  # not as late as the next 0 over a foreign value
-    assert beat.judge(5.0, '', 5.0, {})
-    beat.take(5.0)
-    beat.ended(Outcome.UNKNOWN, 5.5)
-    assert beat.judge(6.0, '', 6.0, {})
+    assert one.is_due(5.0)
+    one.begin(5.0)
+    one.end(5.5, Outcome.UNKNOWN)
+    assert one.is_due(6.0)
 
 
 @pytest.mark.parametrize('polling', POLLING_MODES)

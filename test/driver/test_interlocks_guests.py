@@ -189,10 +189,11 @@ def test_rule_2_plc_behind_a_gateway_that_answers_at_all_is_a_first_contact(
     assert not beat.wants_zero
     plc.failures = 1
     ours = Flight(1, [beat.mapping.extent], beat.take(cell.now), cell.now - 0.5)
+    beat.trial = ours
     ours.end(Outcome.UNKNOWN, cell.now, 1.0)
     plc.write_ended(ours, cell.now)
+    plc.look_again()
     assert plc.pause_end == pytest.approx(cell.now + 7 * 0.5)
-    beat.ended(Outcome.UNKNOWN, cell.now)
     assert plc.ready({}, cell.now + 0.3) == [beat]  # for its gateway answers
     flight = Flight(1, [beat.mapping.extent])
     flight.end(outcome, cell.now, -math.inf)

@@ -17,7 +17,7 @@
 from collections.abc import Sequence
 import math
 
-from abdf1_ros.driver.interlocks.fallback import Crowd
+from abdf1_ros.driver.interlocks.own import Crowd
 from abdf1_ros.settings.heartbeats import Fallback
 from abdf1_ros.settings.mapping import Mapping
 from support.cases import for_all

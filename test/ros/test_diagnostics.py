@@ -34,8 +34,9 @@ from abdf1_ros.driver.checks import StationHealth
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.flights import Flight
 from abdf1_ros.driver.guests import Guest
-from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackState
-from abdf1_ros.driver.interlocks.heartbeat import BeatState
+from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackRow
+from abdf1_ros.driver.interlocks.heartbeat import HeartbeatRow
+from abdf1_ros.driver.interlocks.plc import OwnRow
 from abdf1_ros.driver.overheard import Carried
 from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.driver.settings import DriverSettings
@@ -906,12 +907,23 @@ def test_fallback_value_is_no_message_and_usual_at_start_and_end(
     assert logged.endswith(f': fallback value written: {cause.value}')
 
 
+def confirm(row: OwnRow, value: int) -> None:
+    """Let a PLC have confirmed a value of ours now."""
+    write = Write(row.mapping, [value], NOW, is_own=True)
+    row.trial = Flight(row.mapping.station, [row.mapping.extent], write, NOW)
+    row.trial.end(Outcome.WRITTEN, NOW, 0.0)
+    row.words.flights = [row.trial]
+    row.asked = NOW
+    if isinstance(row, HeartbeatRow):
+        row.counts = value > 0
+
+
 def test_heartbeat_that_the_plc_does_not_confirm_does_not_count(make_bench: Benches) -> None:
     bench = make_bench('alive,Heartbeat,N10:0,1,PLC5,500')
     assert bench.says('interlocks')[1] == (
         'WARN: 0 of 1 heartbeats count; alive: heartbeat does not count')
     beat = bench.driver.interlocks.heartbeats[0]
-    beat.confirmed, beat.state, beat.value = NOW, BeatState.COUNTS, 1
+    confirm(beat, 1)
     assert bench.says('interlocks', NOW) == (OK, 'OK: 1 of 1 heartbeats count')
     values = bench.details('interlocks', NOW + 1.5)
     assert values['station 1'] == 'heartbeat counts (for 1.5 s)'
@@ -927,7 +939,7 @@ def test_heartbeat_that_the_plc_does_not_confirm_does_not_count(make_bench: Benc
 def test_no_heartbeat_counts_while_the_port_is_closed(make_bench: Benches, text: str) -> None:
     bench = make_bench('alive,Heartbeat,N10:0,1,PLC5,500')
     beat = bench.driver.interlocks.heartbeats[0]
-    beat.confirmed, beat.state, beat.value = NOW, BeatState.COUNTS, 1
+    confirm(beat, 1)
     assert bench.says('interlocks', NOW + 0.1) == (OK, 'OK: 1 of 1 heartbeats count')
     bench.set_port(False, text)
     assert bench.says('interlocks', NOW + 0.1) == (
@@ -954,7 +966,7 @@ def test_bit_of_the_plc_confirms_control_while_it_is_fresh_and_1(
         return status.level, details(status)['station 1']
 
     assert station(1, NOW - 1) == (WARN, 'not in control: the PLC has not confirmed it yet')
-    beat.confirmed, beat.state, beat.value = NOW, BeatState.COUNTS, 1
+    confirm(beat, 1)
     assert station(None, NOW) == (
         WARN, 'unknown: ruled has not been read since the heartbeat counts')
     assert station(1, NOW + 1) == (OK, 'in control for 0.0 s')
@@ -1007,32 +1019,34 @@ def test_guests_are_counted_and_told_of(bench: Bench) -> None:
     assert bench.says('guests') == (ERROR, 'ERROR: pty:a: gone; tcp:7: in use')
 
 
-def test_value_of_a_guest_over_a_fallback_is_a_warning(make_bench: Benches) -> None:
+def test_value_of_a_guest_over_a_fallback_is_a_warning(
+        make_bench: Benches, monkeypatch: pytest.MonkeyPatch) -> None:
     line = partial(make_bench, 'speed,Write,N10:1,1,PLC5,7,500',
                    header='Tag,Command,Address,Station,PLC_Type,Fallback,Fallback_After')
     assert line(mode='Slave').details('interlocks') == {
         'speed': 'a message stands', 'bound of speed': 'none: the master of the line decides'}
     bench = line()
     row, = bench.driver.interlocks.fallbacks
-    row.state = FallbackState.STANDS
+    confirm(row, 7)
     assert bench.says('interlocks')[0] == OK
     guest = Flight(1, [row.mapping.extent])
-    guest.done = guest.lands_until = NOW
-    row.write_ended(guest, NOW)
-    row.cause = FallbackCause.TIMEOUT
+    guest.end(Outcome.WRITTEN, NOW + 1, 0.0)
+    row.words.ended(guest)
     assert bench.says('interlocks') == (WARN, (
-        'WARN: 0 of 0 heartbeats count; speed: fallback value is due; speed: a guest has written '
-        'over the fallback value'))
+        'WARN: 0 of 0 heartbeats count; speed: a guest has written over the fallback value'))
+    row.cause = FallbackCause.TIMEOUT
+    assert bench.says('interlocks') == (
+        WARN, 'WARN: 0 of 0 heartbeats count; speed: fallback value is due')
     bound, = Times(bench.driver.network, bench.driver.mappings).bounds()
     row.refusal = 'STS 10'
     assert bench.details('interlocks') == {
-        'speed': 'a guest has written over the fallback value (timeout): STS 10',
+        'speed': 'the fallback value is due (timeout): STS 10',
         'bound of speed': str(bound).partition(': ')[2]}
 
     class Confirmed:  # by the thread of the link at this moment
         value = property(lambda self: setattr(row, 'cause', None) or 'due')
 
-    bench.driver.interlocks.fallbacks[0].state = Confirmed()  # type: ignore[assignment]
+    monkeypatch.setattr(FallbackRow, 'state', Confirmed())
     assert details(bench.diagnostics.statuses(NOW)[-1])['speed'] == 'due (timeout): STS 10'
 
 
@@ -1040,9 +1054,9 @@ def test_station_is_told_by_the_worst_of_its_heartbeats(make_bench: Benches) -> 
     bench = make_bench(*(f'beat_{word},Heartbeat,N10:{word},1,PLC5,1000' for word in range(3)))
     beats = bench.driver.interlocks.heartbeats
     for beat in beats[::2]:
-        beat.confirmed, beat.state, beat.value = NOW, BeatState.COUNTS, 1
+        confirm(beat, 1)
     assert bench.details('interlocks')['station 1'].startswith('not in control: ')
-    beats[1].confirmed, beats[1].state, beats[1].value = NOW, BeatState.COUNTS, 1
+    confirm(beats[1], 1)
     assert bench.details('interlocks')['station 1'].startswith('heartbeat counts (for ')
 
 
@@ -1051,8 +1065,9 @@ def test_heartbeat_that_another_program_writes_is_an_error_with_what_it_wrote(
     bench = make_bench('alive,Heartbeat,N10:0,1,PLC5,500,', 'other,Heartbeat,N10:1,2,PLC5,500,',
                        'ruled,Read,B12:0/2,2,PLC5,1000,other', header=f'{HEADER},Confirms')
     beat, other = bench.driver.interlocks.heartbeats
-    beat.confirmed, beat.state = NOW, BeatState.CONFLICT
-    other.confirmed, other.state, other.value = NOW, BeatState.COUNTS, 1
+    confirm(beat, 0)
+    beat.is_taken = True
+    confirm(other, 1)
     assert bench.says('interlocks') == (ERROR, (
         'ERROR: 1 of 2 heartbeats count; alive: heartbeat does not count; other: the PLC does not '
         'confirm that ROS is in control'))
@@ -1062,7 +1077,8 @@ def test_heartbeat_that_another_program_writes_is_an_error_with_what_it_wrote(
     for row, said in ((other, '5'), (beat, '6'), (beat, text.removeprefix('N10:0: '))):
         bench.events.foreign_value(row.mapping, said, is_conflict=True)
     assert bench.details('interlocks')['station 1'] == f'not in control: {text}'
-    beat.state, beat.value = BeatState.COUNTS, 1
+    beat.is_taken = False
+    confirm(beat, 1)
     assert bench.details('interlocks')['station 1'].startswith('heartbeat counts')
 
 

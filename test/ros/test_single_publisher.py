@@ -22,7 +22,7 @@ import time
 from types import SimpleNamespace
 from typing import cast
 
-from abdf1_ros.driver.interlocks.fallback import Crowd
+from abdf1_ros.driver.interlocks.own import Crowd
 from abdf1_ros.ros.diagnostics.graph import UNKNOWN_NODE
 from abdf1_ros.ros.topics.interlocks import InterlockWatch
 from abdf1_ros.ros.topics.publishers import LivingPublishers

@@ -22,7 +22,7 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 from abdf1_ros.driver.driver import Driver
-from abdf1_ros.driver.interlocks.fallback import Crowd
+from abdf1_ros.driver.interlocks.own import Crowd
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ros.callbacks import AnsweringNode
 from abdf1_ros.ros.diagnostics.graph import UNKNOWN_NODE

@@ -53,7 +53,7 @@ from abdf1_ros.df1.slave import HalfDuplexSlave
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.guest_rules import ShareAccess
 from abdf1_ros.driver.guests import Guest, GuestCommand
-from abdf1_ros.driver.interlocks.fallback import Crowd
+from abdf1_ros.driver.interlocks.own import Crowd
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import WriteResult
 from abdf1_ros.driver.writes.ages import Ages, HostClock, most_ahead

@@ -20,13 +20,13 @@ The rules have the numbers of docs/heartbeats.md.
 
 from __future__ import annotations
 
-from collections.abc import Mapping as MappingType
 from enum import Enum
 import math
 from random import Random
 
 from abdf1_ros.driver.flights import Flight, Words
-from abdf1_ros.driver.write import Outcome, Write
+from abdf1_ros.driver.interlocks.own import Conditions, SelfWritten
+from abdf1_ros.driver.write import Write
 
 LARGEST = 32_767
 
@@ -64,7 +64,7 @@ class OtherWriter:
     """
     What we know of another writer of our heartbeat word, mostly a bridge (rule 19).
 
-    ``seen`` is when its last value was read (clock value, s).
+    ``seen`` is when its last value was read (clock value, s); ``extra_zero`` prolongs the next 0.
     """
 
     def __init__(self, period: float, dice: Random) -> None:
@@ -72,7 +72,7 @@ class OtherWriter:
         self._period = period
         self._dice = dice
         self._zeros = 0  # 0s written again while the other bridge continues
-        self._extra_zero = 0.0  # s
+        self.extra_zero = 0.0  # s, until the heartbeat counts again
 
     def note_value(self, now: float) -> bool:
         """Record a foreign value; return True if one was seen recently before."""
@@ -90,104 +90,108 @@ class OtherWriter:
 
         If both bridges counted from 1 at the same time, neither would see foreign values any more.
         """
-        self._extra_zero = self._period * self._dice.randint(1, _SHIFTS)
-
-    def take_extra_zero(self) -> float:
-        """Return the extra seconds of the next 0, and set them to 0."""
-        extra, self._extra_zero = self._extra_zero, 0.0
-        return extra
+        self.extra_zero = self._period * self._dice.randint(1, _SHIFTS)
 
 
-class HeartbeatRow:
+class HeartbeatRow(SelfWritten):
     """
-    One Heartbeat row, and the known contents of the PLC.
+    One Heartbeat row.
 
     Times are clock values (s).
 
-    - ``value``: the value sent last.
-    - ``confirmed``: when the last reply confirmed a value.
+    - ``counts``: the next value to be written is a number, not 0.
+    - ``is_taken``: another program writes the word (rule 19).
     - ``reason``: why the heartbeat does not count, empty while it counts.
-    - ``refusal``: why the last write was not confirmed; ``tried``: when it was sent.
-    - ``due``: when to look at the row next.
     - ``first``: the number from which the row counts.
-    - ``words``: the writes that may change this word.
     - ``dice``: random numbers, so that two bridges differ.
     """
 
-    def __init__(self, words: Words, first: int, dice: Random) -> None:
-        mapping = words.row
+    def __init__(self, words: Words, conditions: Conditions, first: int, dice: Random) -> None:
+        super().__init__(words, conditions)
+        mapping = self.mapping
         assert mapping.period is not None
-        self.mapping = mapping
-        self.words = words
         self._before_first = first - 1
-        self.state = BeatState.CONTACT
-        self.value = 0
-        self.confirmed: float | None = None
+        self.counts = self.is_taken = False
         self.reason = ''
-        self.refusal = ''
-        self.is_under_way = False
-        self.is_first_try = True  # the 0 that is due has not been sent yet
-        self.tried = -math.inf
-        self.tries = 0  # writes since the last 0 became due
-        self.due = math.inf
         self.topics = mapping.condition.names if mapping.condition else ()
         self._timeout = (mapping.condition and mapping.condition.timeout or 0) / 1000
         self._period = mapping.period / 1000
-        self._is_confirmed = False
-        self._stands = 0  # the value that was confirmed last
-        self.next_beat = -math.inf
         self._other = OtherWriter(self._period, dice)
-        self._holds_at = math.inf  # until when all ``topics`` have a message in time
+
+    @property
+    def value(self) -> int:
+        """Return the value sent last."""
+        write = self.trial.write if self.trial is not None else None
+        return int(write.raw[0]) if write is not None else 0
+
+    @property
+    def confirmed(self) -> float | None:
+        """Return when the last reply confirmed a value, None before the first."""
+        last = self.words.last
+        return last.done if last is not None else None
+
+    @property
+    def state(self) -> BeatState:
+        """Return what the PLC is to see."""
+        if self.is_taken:
+            return BeatState.CONFLICT
+        if self.counts:
+            return BeatState.COUNTS
+        if self.reason:
+            return BeatState.HELD
+        return BeatState.SHOWN if self.is_at_rest else BeatState.CONTACT
 
     def why_not(self, now: float) -> str:
         """Return why no heartbeat counts in the PLC, empty if one counts or may count."""
-        if self.reason or self.confirmed is None:
+        confirmed = self.confirmed
+        if self.reason or confirmed is None:
             return self.reason or self.refusal or 'the PLC has not confirmed it yet'
         if self.state is not BeatState.COUNTS:
             return self.refusal or self.state.value
         if not self.value:
             return BeatState.SHOWN.value
-        silent = now - self.confirmed
+        silent = now - confirmed
         why = f': {self.refusal}' if self.refusal else ''
         return f'not confirmed for {silent:.1f} s{why}' if silent > 3 * self._period else ''
 
     @property
     def is_at_rest(self) -> bool:
-        """Tell whether the PLC has confirmed 0."""
-        return self.value == 0 and self._is_confirmed
+        """Tell whether the PLC has confirmed the 0 that was asked for last."""
+        return self.value == 0 and self.has_confirmed and not self.is_first_try
 
     @property
     def is_confirmed(self) -> bool:
         """Tell whether the PLC has confirmed 0, and no second write of it is planned (rule 10)."""
-        return self.is_at_rest and self.words.again_at == math.inf
+        return self.is_at_rest and self.again_at == math.inf
+
+    @property
+    def is_first_try(self) -> bool:
+        """Tell whether the 0 that is due has not been sent yet."""
+        return self.tried < self.asked
 
     def begin(self, now: float, *, is_new: bool = False) -> None:
         """
         Start again with 0: the station may be a different PLC by now (rule 2).
 
         A conflict with another writer ends if the contact ``is_new``: an opened port, or a change
-        to RUN.
+        to RUN. Otherwise the reply to a 0 may be the contact; this 0 need not be written again.
         """
-        if is_new or self.state is not BeatState.CONFLICT:
-            self.state = BeatState.CONTACT
-        self._write_zero(now)
+        self.is_taken &= not is_new
+        self.counts, latest = False, self.latest
+        is_reply = latest is not None and (latest.outcome is None or latest.done == now)
+        if is_new or self.value or not is_reply:
+            self.asked = now
 
     def ran(self, now: float) -> None:
         """Treat earlier foreign values as leftovers of a download: the PLC went to RUN."""
         self._other.seen = -math.inf
         self.begin(now, is_new=True)
 
-    def _write_zero(self, now: float) -> None:
-        self._is_confirmed, self.is_first_try = False, True
-        self.next_beat = self.due = now
-
     def end(self, now: float) -> bool:
         """Make a 0 due at the end; return False if the PLC surely holds it already."""
-        self.due = now
-        self.words.end(now)
         is_due = not self.is_at_rest or self.words.lands_until > -math.inf
         if is_due:
-            self._write_zero(now)
+            self.asked = now
         return is_due
 
     def write_ended(self, flight: Flight, now: float) -> None:
@@ -201,84 +205,75 @@ class HeartbeatRow:
 
         Until a number is confirmed, the PLC may still hold the 0 before it.
         """
-        if self.value and self._stands:
-            return
-        if self.state in (BeatState.SHOWN, BeatState.COUNTS):  # the 0 has to stand anew
-            self.state = BeatState.CONTACT
-        self._write_zero(now)
+        last = self.words.last
+        stands = last is not None and last.write is not None and last.write.raw[0]
+        if not self.value or not stands:
+            self.counts, self.asked = False, now
 
-    def missing(self, messages: MappingType[str, float], now: float) -> str:
-        """
-        Return the first topic without a message in time, empty for none (rule 3 d).
-
-        ``messages`` has the publication time of the last accepted message of each topic (clock
-        value, s).
-        """
+    def missing(self, now: float) -> str:
+        """Return the first topic without a message in time, empty for none (rule 3 d)."""
+        messages = self.conditions.messages
         return next((topic for topic in self.topics
                      if now >= messages.get(topic, -math.inf) + self._timeout), '')
 
-    def why_missing(self, messages: MappingType[str, float], now: float) -> str:
+    def why_missing(self, now: float) -> str:
         """Return the text for a topic without a message in time, empty for none."""
-        topic = self.missing(messages, now)
+        topic = self.missing(now)
         return f'no message of {topic} in time' if topic else ''
 
-    def topics_until(self, messages: MappingType[str, float]) -> float:
+    @property
+    def topics_until(self) -> float:
         """Return until when the heartbeat may count by rule 3 (d) without a further message."""
+        messages = self.conditions.messages
         return min((messages.get(topic, -math.inf) + self._timeout
                     for topic in self.topics), default=math.inf)
 
-    def executor_until(self, executor: float) -> float:
-        """Return until when rule 3 (c) lets it count; ``executor``: last run of the executor."""
-        return executor + max(self._period, _LEAST_LIFE_SIGN)
+    @property
+    def executor_until(self) -> float:
+        """Return until when rule 3 (c) lets it count."""
+        return self.conditions.executor + max(self._period, _LEAST_LIFE_SIGN)
 
-    def judge(self, now: float, why_held: str, executor: float,
-              messages: MappingType[str, float]) -> bool:
+    def look(self, now: float, why_held: str) -> float:
         """
-        Return True if a write is due now; otherwise plan the next look.
+        Return from when on a write is due; infinite: an event is needed (clock values, s).
 
         ``why_held`` is the reason why the heartbeat must not count (rule 3 b, d), empty if it may.
-        ``executor`` is when the executor ran last.
         """
-        self.reason, self._holds_at = why_held, self.topics_until(messages)
-        if not why_held and self.state is BeatState.HELD and self.is_at_rest:
-            self.state = BeatState.SHOWN
-        if self.state is BeatState.SHOWN and now >= self.next_beat:
-            self.state = BeatState.COUNTS
+        self.reason = why_held
         if why_held:
-            self.hold()
+            self.hold(now)
+        elif not self.is_taken and not self.counts and self.is_at_rest and now >= self._seen_at:
+            self.counts, self._other.extra_zero = True, 0.0
         if self.is_under_way:
-            self.due = math.inf
-        elif self.wants_zero and self.is_at_rest and now >= self.words.again_at:
-            self.due = now
-            return True
-        elif self.state in (BeatState.HELD, BeatState.CONFLICT):
-            again = self.next_beat if self.value == 0 else now
-            self.due = self.words.again_at if self.is_at_rest else again
-        elif self.state is BeatState.SHOWN:
-            self.due = min(self.next_beat, self.words.again_at)
-        elif self.state is not BeatState.COUNTS:
-            self.due = self.next_beat
-        else:
-            self.due = self.next_beat
-            if now >= self.executor_until(executor):
-                self.reason = 'the executor of the node stands still'  # nothing is written then
-                self.due = max(self.next_beat, now + _GLANCE)
-            if self.value:
-                self.due = min(self.due, self._holds_at)
-        return self.due <= now and self.state is not BeatState.SHOWN
+            return math.inf
+        if self.counts:
+            return self._look_at_count(now)
+        if not self.is_at_rest:
+            return self.asked if self.is_first_try \
+                else self.tried + min(self._period, _REPEAT_ZERO)
+        again = self.again_at
+        return again if why_held or self.is_taken else min(again, self._seen_at)
 
-    def hold(self) -> None:
-        """Write 0 at once, if the heartbeat counts (rule 3)."""
-        if self.state is BeatState.COUNTS:
-            self.state = BeatState.HELD
-            self.is_first_try = not self.is_at_rest
+    def _look_at_count(self, now: float) -> float:
+        due = self.tried + self._period if self.value else now
+        if now >= self.executor_until:
+            self.reason = 'the executor of the node stands still'  # nothing is written then
+            due = max(due, now + _GLANCE)
+        return min(due, self.topics_until) if self.value else due
 
     @property
-    def first_due(self) -> float:
-        """Return when the next look at the row may find a first try of a 0 (clock value in s)."""
-        if self.state is not BeatState.COUNTS:
-            return self.due if self.is_first_try else math.inf
-        return self._holds_at if self.value and not self.is_under_way else math.inf
+    def _seen_at(self) -> float:
+        """Return when the PLC has seen the 0 that stands for long enough (rule 2)."""
+        last = self.words.last
+        return (last.done if last is not None else math.inf) \
+            + max(self._period, _LEAST_ZERO) + self._other.extra_zero
+
+    def hold(self, now: float) -> None:
+        """Write 0 at once, if the heartbeat counts (rule 3)."""
+        if self.counts:
+            self.counts = False
+            if not self.is_at_rest:
+                self.asked = now
 
     def read_back(self, value: int, started: float, now: float) -> str:
         """
@@ -289,19 +284,20 @@ class HeartbeatRow:
         until the port is opened again, or until a change to RUN. That change shows that the second
         value was a download as well (rule 19).
         """
-        is_known = self._is_confirmed and not self.is_under_way
+        last = self.words.last
+        is_known = last is not None and last is self.trial and not self.is_under_way \
+            and not self.is_first_try
         if not is_known or started < (self.confirmed or 0.0) or value == self.value:
             return ''
         if self.words.may_hold(value):  # our own value, which a gateway has held
             self.overwritten(now)
             return ''
         text = f'{value} was read where {self.value} was written'
-        was_known, is_again = self.state is BeatState.CONFLICT, self._other.note_value(now)
-        if is_again:
-            self.state = BeatState.CONFLICT
+        was_known, is_again = self.is_taken, self._other.note_value(now)
+        self.is_taken |= is_again
         self.begin(now)
         if was_known:
-            self.next_beat = self.due = now + self._other.next_zero()
+            self.asked = now + self._other.next_zero()
             return ''
         if is_again:
             return (f'another program writes this word: {text}; the bridge writes 0 until the '
@@ -312,43 +308,23 @@ class HeartbeatRow:
     @property
     def wants_zero(self) -> bool:
         """Tell whether the value to be written is 0."""
-        return self.state is not BeatState.COUNTS
+        return not self.counts
 
     def take(self, now: float) -> Write:
         """Return the write of 0 or of the next value; its end has to be reported to ``ended``."""
         self.tries = 1 if self.is_first_try else self.tries + 1
-        self.is_under_way, self.is_first_try, self.tried = True, False, now
-        if self.state is BeatState.SHOWN:  # the 0 is written once more
-            self.state = BeatState.CONTACT
-        if self.wants_zero:
-            self.value, self._is_confirmed = 0, False
-        elif self._is_confirmed:  # otherwise it stays the same (rule 3 a)
-            before = self.value or self._before_first
-            self.value, self._is_confirmed = before % LARGEST + 1, False
-        pause = min(self._period, _REPEAT_ZERO) if self.wants_zero else self._period
-        self.next_beat = now + pause
-        self.due = math.inf
-        return Write(self.mapping, [self.value], now, is_own=True)
+        value = 0
+        if self.counts:  # an unconfirmed number stays the same (rule 3 a)
+            value = self.value
+            if self.has_confirmed:
+                value = (value or self._before_first) % LARGEST + 1
+        return Write(self.mapping, [value], now, is_own=True)
 
     def refresh(self, now: float) -> Write:
         """Return the write of a 0 that the PLC holds already: it stays confirmed in any case."""
-        self.is_under_way, self.tried = True, now
-        self.due = math.inf
         return Write(self.mapping, [0], now, is_own=True)
 
-    def ended(self, outcome: Outcome, now: float) -> None:
-        """Record how the write ended."""
-        self.is_under_way = False
-        self.due = now
-        if outcome is not Outcome.WRITTEN:
-            return
-        self._is_confirmed, self.confirmed, self._stands = True, now, self.value
-        if self.value:
-            return
-        self.words.plan_again(self.tried)
-        if self.state is not BeatState.CONFLICT:
-            self.next_beat = now + max(self._period, _LEAST_ZERO) + self._other.take_extra_zero()
-        if self.state is BeatState.CONTACT:
-            self.state = BeatState.SHOWN
-        if self.words.are_guests:
+    def ended(self, now: float) -> None:
+        """Record that a write of ours has ended: a guest may have written over a 0 meanwhile."""
+        if self.value == 0 and self.has_confirmed and self.words.are_guests:
             self.overwritten(now)

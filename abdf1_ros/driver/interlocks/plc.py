@@ -12,6 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
+
 """
 One PLC: its heartbeats and fallbacks, and which of them goes first.
 
@@ -22,15 +23,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from collections.abc import Mapping as MappingType
-from dataclasses import dataclass, field
 import math
 from operator import attrgetter
 
 from abdf1_ros.df1.probes import OTHERS_SHARE
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.flights import Flight, Flights
-from abdf1_ros.driver.interlocks.fallback import Crowd, FallbackCause, FallbackRow
+from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackRow, FallbackState
 from abdf1_ros.driver.interlocks.heartbeat import HeartbeatRow
+from abdf1_ros.driver.interlocks.own import Conditions
 from abdf1_ros.driver.write import key_of, Outcome
 from abdf1_ros.settings.heartbeats import LEAST_REFRESH
 from abdf1_ros.settings.mapping import Mapping
@@ -55,34 +56,26 @@ OwnRow = HeartbeatRow | FallbackRow
 TurnRank = tuple[float, ...]
 
 
-@dataclass(slots=True)
-class Conditions:
+class Looks:
     """
-    Conditions that all PLCs of a line depend on.
+    When each row may want to be written, a clock value (s): to ask all rows takes long.
 
-    Times are clock values (s).
-
-    - ``executor``: when the ROS executor ran last.
-    - ``messages``: publication time of the last accepted message of each topic.
-    - ``crowds``: the last crowd of each topic of rows with Single_Publisher. The thread of the
-      callbacks sets it before it hands on a message that came since.
-    - ``is_ending``: the bridge ends; ``ended``: when the end began, infinite before it.
-    - ``gave_way``: when heartbeats last gave way to a fallback that stands.
-    - ``is_beats_turn``: they have just given way to such a fallback, or to a read.
+    It is a cache: an event touches the rows that it may concern, and they are asked anew. After a
+    change of ``times``, ``plan`` finds the ``first`` of all.
     """
 
-    executor: float = -math.inf
-    messages: dict[str, float] = field(default_factory=dict)
-    crowds: dict[str, Crowd] = field(default_factory=dict)
-    is_ending: bool = False
-    ended: float = math.inf
-    gave_way: float = -math.inf
-    is_beats_turn: bool = False
+    def __init__(self, rows: Iterable[OwnRow]) -> None:
+        self.times: dict[OwnRow, float] = dict.fromkeys(rows, math.inf)
+        self.first = math.inf
 
-    @property
-    def are_all_due(self) -> bool:
-        """Tell whether the end has begun."""
-        return self.ended < math.inf
+    def touch(self, *rows: OwnRow) -> None:
+        """Ask these rows anew."""
+        for row in rows:
+            self.times[row] = self.first = -math.inf
+
+    def plan(self) -> None:
+        """Find the first of all."""
+        self.first = min(self.times.values(), default=math.inf)
 
 
 class Plc:
@@ -91,9 +84,8 @@ class Plc:
 
     Times are clock values (s).
 
-    - ``due``: when to look at its rows next.
-    - ``first_due``: the same for first tries of a 0 or a fallback; a pause does not delay these.
-    - ``refresh_due``: when to look for fallbacks to be written again (rule 8).
+    - ``looks``: when to ask its rows; ``refreshes``: the same for fallbacks to be written again
+      (rule 8).
     - ``failures``: number of our own writes without an answer since the last answered write. That
       may also be the write of a message or a guest.
     - ``pause_end``: after the second and each later failure, only first tries are sent until then.
@@ -105,11 +97,10 @@ class Plc:
         self.rows = [*rows]
         self.heartbeats = [row for row in self.rows if isinstance(row, HeartbeatRow)]
         self.fallbacks = [row for row in self.rows if isinstance(row, FallbackRow)]
-        self.due = self.first_due = self.refresh_due = math.inf
+        self.looks, self.refreshes = Looks(self.rows), Looks(self.fallbacks)
         self.failures = 0
         self.pause_end = -math.inf
         self._is_running: bool | None = None
-        self._held_up: list[FallbackRow] = []
         self._stations = stations
         self._flights = flights
         self._conditions = conditions
@@ -129,21 +120,25 @@ class Plc:
         """Tell whether it has answered the last of our own writes, and answers in time."""
         return not self.failures and self._stations[self.station].replies_in_time
 
-    def plan(self) -> None:
-        """Plan the next look at its rows, at the earliest ``due`` of them."""
-        self.due = min([row.due for row in self.rows], default=math.inf)
-        self.first_due = min([row.first_due for row in self.rows], default=math.inf)
-
-    def plan_refresh(self, row: FallbackRow) -> None:
-        """Plan when a fallback is to be written again, if the PLC holds it."""
-        if row.stands:
-            self.refresh_due = min(self.refresh_due, row.refresh_at)
-
     def look_again(self, *rows: OwnRow) -> None:
-        """Look at these rows at once."""
-        for row in rows:
-            row.due = self.due = -math.inf
-            self.first_due = min(self.first_due, row.first_due)
+        """Ask these rows anew, or all; each of them may change what its heartbeats may do."""
+        self.looks.touch(*(rows or self.rows), *self.heartbeats)
+        for row in rows or self.rows:
+            if isinstance(row, FallbackRow):
+                self.refreshes.times[row] = self._refresh_at(row)
+        self.refreshes.plan()
+
+    def begins(self, row: OwnRow) -> None:
+        """Ask a row no more: a write of it begins, and its end is an event."""
+        self.looks.times[row] = math.inf
+        self.looks.plan()
+        if isinstance(row, FallbackRow):
+            self.refreshes.times[row] = math.inf
+            self.refreshes.plan()
+
+    @staticmethod
+    def _refresh_at(row: FallbackRow) -> float:
+        return row.refresh_at if row.stands and not row.is_under_way else math.inf
 
     # What happens
 
@@ -154,9 +149,7 @@ class Plc:
         for row in self.fallbacks:
             if not row.is_fresh(now):
                 row.make_due(FallbackCause.RETURN, now)
-            else:  # the message that delays it may have been lost with the port
-                row.due = -math.inf
-        self.plan()
+        self.look_again()
 
     def mode_seen(self, is_running: bool, now: float) -> None:
         """Record its mode; a change to RUN is a first contact (rules 2, 8)."""
@@ -167,12 +160,7 @@ class Plc:
             beat.ran(now)
         for row in self.fallbacks:
             row.make_due(FallbackCause.RUN, now)
-        self.plan()
-
-    def release(self) -> None:
-        """Release fallbacks that waited for a write of their words (rule 9)."""
-        self.look_again(*self._held_up)
-        self._held_up.clear()
+        self.look_again()
 
     def write_ended(self, flight: Flight, now: float) -> None:
         """
@@ -200,26 +188,36 @@ class Plc:
 
     def ready(self, youngest: MappingType[Mapping, float], now: float) -> list[OwnRow]:
         """Return the rows with a due write; ``youngest`` has the youngest message of each row."""
-        due = [row for row in self.fallbacks
-               if row.due <= now and row.judge(now, youngest.get(row.mapping, -math.inf))]
-        held_up = [row for row in due if not self._flights.may_begin(row.mapping)]
-        for row in held_up:  # a write of its words is under way (rule 9); its end is reported
-            row.due = math.inf
-        self._held_up += held_up
-        why, conditions = self._why_held() if self.heartbeats else '', self._conditions
-        beats = [beat for beat in self.heartbeats if beat.judge(
-            now, why or beat.why_missing(conditions.messages, now), conditions.executor,
-            conditions.messages)]
-        if not self.is_active:  # an inactive station gets only 0 (rule 4)
-            for beat in beats:
-                if not beat.wants_zero:
-                    beat.due = beat.first_due
-            beats = [beat for beat in beats if beat.wants_zero]
-        found: list[OwnRow] = [*beats, *(row for row in due if row not in held_up)]
-        for own in found:
-            own.due = max(own.due, self._again(own))
-        self.plan()
-        return [own for own in found if own.due <= now]
+        times = self.looks.times
+        for row in self.fallbacks:
+            if times[row] <= now:
+                times[row] = self._look(row, row.look(
+                    now, youngest.get(row.mapping, -math.inf)), now)
+        why = self._why_held() if self.heartbeats else ''
+        for beat in self.heartbeats:
+            times[beat] = self._look(beat, beat.look(now, why or beat.why_missing(now)), now)
+        self.looks.plan()
+        return [row for row in self.rows if times[row] <= now]
+
+    def _look(self, row: OwnRow, when: float, now: float) -> float:
+        """Return when a row that wants to be written may be: not while its words are written."""
+        if when > now:
+            return when
+        if isinstance(row, HeartbeatRow):
+            if row.counts and not self.is_active:  # an inactive station gets only 0 (rule 4)
+                return self._first_due(row)
+        elif not self._flights.may_begin(row.mapping):  # the end of that write is an event (9)
+            return math.inf
+        return max(when, self._again(row))
+
+    def _first_due(self, row: OwnRow) -> float:
+        """Return when a row may want a first try of a 0 or fallback (clock value in s)."""
+        if isinstance(row, FallbackRow):
+            may_be = row.is_first_try or row.state is FallbackState.MESSAGE
+            return self.looks.times[row] if may_be else math.inf
+        if row.counts:
+            return row.topics_until if row.value and not row.is_under_way else math.inf
+        return self.looks.times[row] if row.is_first_try else math.inf
 
     def _again(self, row: OwnRow) -> float:
         """
@@ -264,7 +262,7 @@ class Plc:
         if self.answers:
             if isinstance(row, FallbackRow) and row.stands:
                 had_turn = now if conditions.is_beats_turn else conditions.gave_way
-                return 2, max(row.words.again_at, had_turn), row.tried
+                return 2, max(row.again_at, had_turn), row.tried
             return (2, row.tried) if is_beat else (1, 0, not is_zero, row.tried)
         if now < self._free_from:
             return None
@@ -272,16 +270,17 @@ class Plc:
 
     def to_refresh(self, youngest: MappingType[Mapping, float], now: float) -> FallbackRow | None:
         """Return the next fallback to be written again (rule 8); put off those that must wait."""
-        standing = [row for row in self.fallbacks if row.stands]
-        for row in sorted(standing, key=_refresh_of):
-            if row.refresh_at > now:
-                break
+        times = self.refreshes.times
+        due = [row for row in self.fallbacks if times[row] <= now]
+        for row in due:
+            times[row] = self._refresh_at(row)
+        for row in sorted((row for row in due if times[row] <= now), key=_refresh_of):
             is_put_off = row.mapping in youngest and not row.has_failed
             if not is_put_off and self._flights.may_begin(row.mapping) \
                     and self._stations[self.station].replies_in_time:
                 return row
-            row.refresh_at = now + min(row.after, LEAST_REFRESH)
-        self.refresh_due = min(map(_refresh_of, standing), default=math.inf)
+            times[row] = now + min(row.after, LEAST_REFRESH)
+        self.refreshes.plan()
         return None
 
     @property
@@ -300,16 +299,18 @@ class Plc:
 
     def next_due(self, least: float) -> float:
         """Return when the next write may be sent, if before ``least`` (clock values, s)."""
-        least = min(least, self.refresh_due)
-        if self.due >= least:
+        least, due = min(least, self.refreshes.first), self.looks.first
+        if due >= least:
             return least
+        times = self.looks.times
         if self._has_last_try:
-            return min([least, *(row.due for row in self.rows
+            return min([least, *(times[row] for row in self.rows
                                  if row.tried < self._conditions.ended)])
-        return min(least, self.first_due, max(self.due, self._free_from))
+        if (free_from := self._free_from) <= due:
+            return due
+        return min(least, max(due, free_from), *map(self._first_due, self.rows))
 
     def good_until(self, beat: HeartbeatRow, youngest: MappingType[Mapping, float]) -> float:
         """Return until when a heartbeat may be sent (clock value, s): its conditions end then."""
         ends = [row.deadline(youngest.get(row.mapping, -math.inf)) for row in self.fallbacks]
-        return min([beat.executor_until(self._conditions.executor),
-                    beat.topics_until(self._conditions.messages), *ends])
+        return min([beat.executor_until, beat.topics_until, *ends])

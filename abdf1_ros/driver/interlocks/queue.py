@@ -29,14 +29,10 @@ from operator import attrgetter
 from random import Random
 
 from abdf1_ros.driver.flights import Flight, WriteListener
-from abdf1_ros.driver.interlocks.fallback import (
-    Crowd,
-    FallbackCause,
-    FallbackRow,
-    FallbackState,
-)
-from abdf1_ros.driver.interlocks.heartbeat import BeatState, HeartbeatRow, LARGEST
-from abdf1_ros.driver.interlocks.plc import Conditions, OwnRow, Plc, TurnRank
+from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackRow, FallbackState
+from abdf1_ros.driver.interlocks.heartbeat import HeartbeatRow, LARGEST
+from abdf1_ros.driver.interlocks.own import Conditions, Crowd
+from abdf1_ros.driver.interlocks.plc import OwnRow, Plc, TurnRank
 from abdf1_ros.driver.job_tasks import Job
 from abdf1_ros.driver.reads.readings import ValueListener
 from abdf1_ros.driver.served import Served
@@ -50,7 +46,7 @@ from abdf1_ros.settings.heartbeats import LAST_ANSWER
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.rows import Rows
 
-_due_of, _refresh_due_of = attrgetter('due'), attrgetter('refresh_due')
+_first_look, _first_refresh = attrgetter('looks.first'), attrgetter('refreshes.first')
 
 
 class Interlocks(WriteListener):
@@ -64,7 +60,7 @@ class Interlocks(WriteListener):
     - ``warn``: gets foreign heartbeat values.
     - ``seed``: a different number in each bridge. Two bridges that began together would not see
       each other if both counted from 1.
-    - ``ours``: the rows of our own table; ``expire`` has work when ``ours`` is due.
+    - ``ours``: the rows of our own table; ``expire`` has work when ``ours`` has to be looked at.
 
     Only ``executor_ran``, ``crowd``, ``wind_down`` and ``resume`` may be called from another
     thread.
@@ -74,11 +70,12 @@ class Interlocks(WriteListener):
                  served: Served, listener: ValueListener,
                  warn: Callable[[Mapping, str, bool], None], seed: int = 0) -> None:
         flights, dice = writing.flights, Random(seed)
-        self.heartbeats = [HeartbeatRow(flights.words_of(mapping), 1 + seed % LARGEST, dice)
-                           for mapping in mappings.heartbeats]
-        self.fallbacks = [FallbackRow(flights.words_of(mapping))
+        self.conditions = conditions = Conditions()
+        self.heartbeats = [
+            HeartbeatRow(flights.words_of(mapping), conditions, 1 + seed % LARGEST, dice)
+            for mapping in mappings.heartbeats]
+        self.fallbacks = [FallbackRow(flights.words_of(mapping), conditions)
                           for mapping in mappings.fallbacks]
-        self.conditions = Conditions()
         rows: list[OwnRow] = [*self.heartbeats, *self.fallbacks]
         stations_of = {row: row.mapping.extent.station for row in rows}
         self.plcs = {number: Plc(
@@ -90,8 +87,9 @@ class Interlocks(WriteListener):
         self._by_mapping = {row.mapping: row for row in self.fallbacks}
         self._single = [row for row in self.fallbacks if row.mapping.single_publisher]
         self._row_of = {row.mapping: row for row in rows}
+        self._meeting: dict[Mapping, list[OwnRow]] = {}  # cached, as it takes long to find out
         self._writes = writes
-        self._writing = writing
+        self._writing, self._line = writing, writing.line
         self._served = served
         self._listener, self._warn = listener, warn
         self._has_begun = False
@@ -134,8 +132,6 @@ class Interlocks(WriteListener):
         """Continue after ``wind_down``: the next opening of the port is a first contact."""
         self.conditions.is_ending, self.conditions.ended = False, math.inf
         self._standing = ()
-        for row in self._plc_of:
-            row.words.resume()
 
     @property
     def is_over(self) -> bool:
@@ -213,14 +209,13 @@ class Interlocks(WriteListener):
         self._has_begun = True
         for plc in self.plcs.values():
             plc.contact(now, is_new=True)
-        self.ours.plan()
+        self.ours.look_again()
 
     def earlier_may_land(self, stations: Container[int]) -> None:
-        """Write again what such a write may have replaced, also where it has just shown (10)."""
-        for row, plc in self._plc_of.items():
-            if plc.station in stations and row.is_confirmed:
-                row.words.earlier_may_land()
-                plc.look_again(row)
+        """Write again what such a write may have replaced (rule 10)."""
+        for plc in self.plcs.values():
+            if plc.station in stations:
+                plc.look_again()
 
     def forget_served(self) -> None:
         """Serve 0, or the fallback of a row: other bridges may take messages from now on."""
@@ -245,17 +240,17 @@ class Interlocks(WriteListener):
             if mapping in block.mappings:
                 value = int(mapping.codec.decode(data[block.slice_of(mapping)])[0])
                 if text := beat.read_back(value, started, self._writing.line.now):
-                    self._warn(mapping, text, beat.state is BeatState.CONFLICT)
-                self._plc_of[beat].plan()
+                    self._warn(mapping, text, beat.is_taken)
+                self._plc_of[beat].look_again(beat)
 
     def message_came(self, write: Write) -> None:
         """Record an accepted message (rule 3 d)."""
-        topic, messages = write.mapping.topic, self.conditions.messages
+        topic, messages, now = write.mapping.topic, self.conditions.messages, self._line.now
         for beat in self.heartbeats:
             if topic in beat.topics:
-                if beat.missing(messages, write.requested):
+                if beat.missing(write.requested):
                     # the time-out passed before a look: the line was busy all the time
-                    beat.hold()
+                    beat.hold(now)
                 self._plc_of[beat].look_again(beat)
         messages[topic] = max(write.requested, messages.get(topic, -math.inf))
 
@@ -281,7 +276,7 @@ class Interlocks(WriteListener):
             is_new, row.refused_until = crowd.until > row.refused_until, crowd.until
             if is_new:
                 row.make_due(FallbackCause.PUBLISHERS, now)
-                self._plc_of[row].plan()
+                self._plc_of[row].look_again(row)
                 yield row.mapping, crowd.why
 
     def is_put_off(self, write: Write) -> bool:
@@ -306,29 +301,35 @@ class Interlocks(WriteListener):
 
     def write_ended(self, flight: Flight) -> None:
         """Record how any write ended: fallbacks may wait for its end (rules 7, 9)."""
-        now = self._writing.flights.line.now
+        now = self._line.now
         if flight.station in self.plcs:
             self.plcs[flight.station].write_ended(flight, now)
-        rows: list[OwnRow] = []
-        if flight.write is None:
-            rows += (row for plc in self.plcs.values() for row in plc.rows
-                     if flight.meets(row.mapping.extent))
-        elif flight.write.mapping in self._by_mapping and not flight.write.is_own:
-            rows.append(self._by_mapping[flight.write.mapping])
+        write, rows = flight.write, self._met(flight)
         for row in rows:
-            row.write_ended(flight, now)
-            if not row.is_confirmed:
-                self._leave_standing(row)
-            if isinstance(row, FallbackRow):
-                if not row.stands and self.conditions.are_all_due:
-                    row.make_due(FallbackCause.END, now)
-                else:
-                    self._plc_of[row].plan_refresh(row)
-            self._plc_of[row].look_again(row)
-        for plc in self.plcs.values():
-            plc.release()
-        if (write := flight.write) is not None and write.is_own:
+            if write is None or flight.is_message_of(row.mapping):
+                self._written_by_others(row, flight, now)
+        if write is not None and write.is_own:
             self._own_ended(flight, write, now)
+        for row in rows:
+            self._plc_of[row].look_again(row)
+
+    def _met(self, flight: Flight) -> list[OwnRow]:
+        """Return the rows whose words a write may change: some may have waited for its end (9)."""
+        if flight.write is None:
+            return [row for row in self._plc_of if flight.meets(row.mapping.extent)]
+        mapping = flight.write.mapping
+        if mapping not in self._meeting:
+            self._meeting[mapping] = [
+                row for row in self._plc_of if flight.meets(row.mapping.extent)]
+        return self._meeting[mapping]
+
+    def _written_by_others(self, row: OwnRow, flight: Flight, now: float) -> None:
+        """Record the end of a message to a row, or of a guest's write of its words."""
+        row.write_ended(flight, now)
+        if not row.is_confirmed:
+            self._leave_standing(row)
+        if isinstance(row, FallbackRow) and not row.stands and self.conditions.are_all_due:
+            row.make_due(FallbackCause.END, now)
 
     def write_expired(self, write: Write) -> None:
         """Let the fallback stop waiting for a message that has ended before it had the line."""
@@ -350,12 +351,12 @@ class Interlocks(WriteListener):
 
     def _first(self, now: float, busy: Container[int], only_active: bool) -> WriteJob | None:
         """Return the first of all writes that are due."""
-        if now < min(map(_due_of, self.plcs.values()), default=math.inf):
+        if now < min(map(_first_look, self.plcs.values()), default=math.inf):
             return None
         best: tuple[TurnRank, Plc, OwnRow] | None = None
         youngest: dict[Mapping, float] | None = None
         for plc in self.plcs.values():
-            if plc.due > now or plc.station in busy or only_active and not plc.is_active:
+            if plc.looks.first > now or plc.station in busy or only_active and not plc.is_active:
                 continue
             youngest = self._writes.youngest() if youngest is None else youngest
             for row in plc.ready(youngest, now):
@@ -372,8 +373,10 @@ class Interlocks(WriteListener):
         if not rows:
             return None
         row = min(rows, key=lambda row: not self._plc_of[row].is_active)
-        return WriteJob(row.refresh(now), self._writing, math.inf,
-                        answer_within=self._answer_within(self._plc_of[row]))
+        job = WriteJob(row.refresh(now), self._writing, math.inf,
+                       answer_within=self._answer_within(self._plc_of[row]))
+        row.repeat = job.flight
+        return job
 
     def _to_repeat(self, only_active: bool) -> Iterator[OwnRow]:
         """Return the rows that stood when the end began, and were not sent since."""
@@ -406,10 +409,11 @@ class Interlocks(WriteListener):
             expires = plc.good_until(row, youngest)
         self.conditions.is_beats_turn = is_again
         is_first = row.is_first_try
-        write = row.take(now)
-        plc.plan()
-        return WriteJob(write, self._writing, expires, is_free=is_first,
-                        answer_within=self._answer_within(plc))
+        job = WriteJob(row.take(now), self._writing, expires, is_free=is_first,
+                       answer_within=self._answer_within(plc))
+        row.trial = job.flight
+        plc.begins(row)
+        return job
 
     def beats_gave_way(self) -> None:
         """Record that heartbeats gave way to a read: they go next."""
@@ -418,8 +422,8 @@ class Interlocks(WriteListener):
     def is_beats_turn(self, now: float) -> bool:
         """Tell whether a heartbeat of a PLC that answers is due, and has given way already."""
         return self.conditions.is_beats_turn and any(
-            beat.due <= now and not beat.wants_zero and self._plc_of[beat].answers
-            for beat in self.heartbeats)
+            beat.counts and plc.looks.times[beat] <= now and plc.answers
+            for plc in self.plcs.values() for beat in plc.heartbeats)
 
     def refresh(self, now: float, busy: Container[int] = ()) -> WriteJob | None:
         """
@@ -429,11 +433,14 @@ class Interlocks(WriteListener):
         message of the row was not confirmed.
         """
         due = [plc for plc in self.plcs.values()
-               if plc.refresh_due <= now and plc.station not in busy]
-        for plc in sorted(due, key=_refresh_due_of):
+               if plc.refreshes.first <= now and plc.station not in busy]
+        for plc in sorted(due, key=_first_refresh):
             row = plc.to_refresh(self._writes.youngest(), now)
             if row is not None:
-                return WriteJob(row.refresh(now), self._writing, math.inf)
+                job = WriteJob(row.refresh(now), self._writing, math.inf)
+                row.trial = job.flight
+                plc.begins(row)
+                return job
         return None
 
     def is_urgent(self, job: Job) -> bool:
@@ -446,26 +453,22 @@ class Interlocks(WriteListener):
         if not isinstance(job, WriteJob) or not job.is_own:
             return False
         row = self._by_mapping[job.write.mapping]
-        return row.words.again_at <= self._writing.line.now \
+        return row.again_at <= self._line.now \
             or row.mapping in self._writes.youngest()
 
     def _own_ended(self, flight: Flight, write: Write, now: float) -> None:
         """Record how one of our own writes ended."""
         assert flight.outcome is not None
         row, outcome = self._row_of[write.mapping], flight.outcome
-        plc = self._plc_of[row]
         if isinstance(row, HeartbeatRow):
-            row.ended(outcome, now)
+            row.ended(now)
         else:
             self._fallback_ended(row, write, outcome, now)
-        if outcome is not Outcome.WRITTEN:
-            if row in self._standing:  # it stood before, so it is not tried again
-                row.words.again_at = math.inf
-        elif row.tried < self.conditions.ended < math.inf:  # under way when the end began
-            self._standing += (row,)
-        else:
-            self._leave_standing(row)
-        plc.plan()  # the row is due, so its heartbeats are judged again, too (rule 3 b)
+        if outcome is Outcome.WRITTEN:
+            if row.tried < self.conditions.ended < math.inf:  # under way when the end began
+                self._standing += (row,)
+            else:
+                self._leave_standing(row)
         if outcome is not Outcome.NOT_SENT:
             refusal = '' if outcome is Outcome.WRITTEN else str(flight.error)
             if isinstance(flight.error, RemoteError) and refusal != row.refusal:
@@ -481,7 +484,6 @@ class Interlocks(WriteListener):
                         now: float) -> None:
         cause = row.cause
         seconds = row.ended(outcome, now)
-        self._plc_of[row].plan_refresh(row)
         if seconds is not None and cause is not None:
             self._listener.written(WriteResult(
                 row.mapping, Outcome.FALLBACK, cause.value, write.value, seconds))
@@ -492,16 +494,14 @@ class Interlocks(WriteListener):
             return
         if self.is_ending and not self.conditions.are_all_due:
             self._make_all_due(now)
-        if now < self.ours.due:
+        if now < self.ours.looks.first:
             return
-        youngest = self._writes.youngest()
-        for row in self.ours.fallbacks:
-            if row.due <= now and row.judge(now, youngest.get(row.mapping, -math.inf)):
-                write = row.take(now)
-                self._served.store(write.mapping, write.raw)
-                self._fallback_ended(row, write, Outcome.WRITTEN, now)
-                row.judge(now, -math.inf)
-        self.ours.plan()
+        flights = self._writing.flights
+        for own in self.ours.ready(self._writes.youngest(), now):
+            write = own.take(now)
+            own.trial = flights.begin(OUR_TABLE, (own.mapping.extent,), write)
+            self._served.store(write.mapping, write.raw)
+            flights.ended(own.trial, Outcome.WRITTEN)
 
     def _make_all_due(self, now: float) -> None:
         for row in self.fallbacks:
@@ -512,7 +512,7 @@ class Interlocks(WriteListener):
         self._awaited = frozenset(plc.station for plc in self.plcs.values() if plc.is_active)
         self.conditions.ended = now
         for plc in (*self.plcs.values(), self.ours):
-            plc.plan()
+            plc.look_again()
 
     def next_due(self) -> float:
         """Return when the next write is due (clock value in s), infinite for never."""

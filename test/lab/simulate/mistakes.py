@@ -54,7 +54,7 @@ from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.flights import Flight, Words
 from abdf1_ros.driver.guests import GuestJob
 from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackRow
-from abdf1_ros.driver.interlocks.heartbeat import BeatState, HeartbeatRow
+from abdf1_ros.driver.interlocks.heartbeat import HeartbeatRow
 from abdf1_ros.driver.interlocks.plc import Plc
 from abdf1_ros.driver.interlocks.queue import Interlocks
 from abdf1_ros.driver.reads import job
@@ -89,37 +89,29 @@ class Mistake:
 
 def _counts_by_two(take: Any) -> Any:
     def take_wrongly(self: HeartbeatRow, now: float) -> Write:
-        take(self, now)
-        if self.value:
-            self.value = self.value % 32_767 + 1
-        return Write(self.mapping, [self.value], now)
+        value = int(take(self, now).raw[0])
+        return Write(self.mapping, [value % 32_767 + 1 if value else 0], now, is_own=True)
 
     return take_wrongly
 
 
 def _counts_unconfirmed(take: Any) -> Any:
     def take_wrongly(self: HeartbeatRow, now: float) -> Write:
-        self._is_confirmed = True
-        return take(self, now)  # type: ignore[no-any-return]
+        with mock.patch.object(HeartbeatRow, 'has_confirmed', True):
+            return take(self, now)  # type: ignore[no-any-return]
 
     return take_wrongly
 
 
 def _begins_to_count(begin: Any) -> Any:
     def begin_wrongly(self: HeartbeatRow, now: float, *, is_new: bool = False) -> None:
-        self.state, self._is_confirmed = BeatState.COUNTS, True
-        self.next_beat = self.due = now
+        self.counts, self.asked = True, -math.inf
 
     return begin_wrongly
 
 
-def _short_zero(ended: Any) -> Any:
-    def end_wrongly(self: HeartbeatRow, outcome: Outcome, now: float) -> None:
-        ended(self, outcome, now)
-        if not self.value and self.state is BeatState.SHOWN:
-            self.next_beat = self.due = now + 0.1
-
-    return end_wrongly
+def _short_zero(seen_at: Any) -> Any:
+    return property(lambda self: self.confirmed + 0.1)
 
 
 def _always_confirmed(ended: Any) -> Any:
@@ -181,7 +173,8 @@ def _lives_longer(init: Any) -> Any:
 
 
 def _refused_refreshes(ended: Any) -> Any:
-    return lambda self, requested, outcome: ended(self, requested, Outcome.WRITTEN)
+    return lambda self, requested, outcome, **named: ended(
+        self, requested, Outcome.WRITTEN, **named)
 
 
 def _requires_nothing(init: Any) -> Any:
@@ -192,8 +185,8 @@ def _requires_nothing(init: Any) -> Any:
     return init_wrongly
 
 
-def _sees_no_guest(ended: Any) -> Any:
-    return lambda self, flight, now: ended(self, flight, now) if flight.write else None
+def _sees_no_guest(guest_done: Any) -> Any:
+    return lambda self, *, is_known: -math.inf
 
 
 def _meets_one_station(meets: Any) -> Any:
@@ -345,13 +338,13 @@ def _always(value: Any) -> Callable[[Any], Any]:
 MISTAKES = (
     Mistake('1', 'the heartbeat counts by two', HeartbeatRow, 'take', _counts_by_two),
     Mistake('2', 'no 0 at first contact', HeartbeatRow, 'begin', _begins_to_count),
-    Mistake('2', 'the 0 stands for 0.1 s', HeartbeatRow, 'ended', _short_zero),
+    Mistake('2', 'the 0 stands for 0.1 s', HeartbeatRow, '_seen_at', _short_zero),
     Mistake('3 a', 'it counts on without a confirmation', HeartbeatRow, 'take',
             _counts_unconfirmed),
     Mistake('3 b', 'it counts beside a fallback that is due', Plc, '_why_held',
             _always('')),
     Mistake('3 c', 'it counts while the executor stands still', HeartbeatRow, 'executor_until',
-            _always(math.inf)),
+            lambda before: property(lambda self: math.inf)),
     Mistake('3 d', 'it counts without the topics that it requires', HeartbeatRow, '__init__',
             _requires_nothing),
     Mistake('4', 'heartbeats have results', Interlocks, '_own_ended', _beats_are_told),
@@ -398,8 +391,8 @@ MISTAKES = (
     Mistake('7', 'messages wait for ever', WriteQueue, 'patience_of', _always(60.0)),
     Mistake('8', 'no fallback after the timeout', FallbackRow, 'deadline', _always(math.inf)),
     Mistake('8', 'a change to RUN is not seen', Interlocks, 'mode_seen', _always(None)),
-    Mistake('8', 'a fallback that stands is not written again', Plc, 'plan_refresh',
-            _always(None)),
+    Mistake('8', 'a fallback that stands is not written again', Plc, '_refresh_at',
+            lambda before: staticmethod(lambda row: math.inf)),
     Mistake('9', 'a message from before the fallback is sent after it', Interlocks,
             'is_overruled', _always(False)),
     Mistake('10', 'a fallback is tried once', FallbackRow, 'ended', _always_confirmed),
@@ -412,9 +405,9 @@ MISTAKES = (
     Mistake('19', 'nobody looks for another writer', HeartbeatRow, 'read_back', _always('')),
     Mistake('5', 'the end does not wait for what may land', Words, 'lands_until',
             lambda before: property(lambda self: -math.inf)),
-    Mistake('10', 'nothing is written again after what a gateway may hold', Words, 'plan_again',
-            _always(None)),
-    Mistake('8', 'a guest over a fallback is not seen', FallbackRow, 'write_ended',
+    Mistake('10', 'nothing is written again after what a gateway may hold', Words, 'again_at',
+            _always(math.inf)),
+    Mistake('8', 'a guest over a fallback is not seen', Words, '_guest_done',
             _sees_no_guest),
     Mistake('29', 'each failure is one of the station', OddCommands, 'is_suspect', _always(False)),
     Mistake('29', 'odd rows have no share', Probes, 'spent', _always(None)),

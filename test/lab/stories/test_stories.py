@@ -22,7 +22,6 @@ from typing import Any
 from unittest import mock
 
 from abdf1_ros.driver.flights import Flights, Words
-from abdf1_ros.driver.interlocks.fallback import FallbackRow
 from abdf1_ros.driver.interlocks.queue import Interlocks
 import pytest
 from stories.scenes import SCENES, SMALL
@@ -62,21 +61,28 @@ def test_story_that_was_told_wrongly_once(name: str, text: str) -> None:
     assert tell_broken(name, text) == ''
 
 
+def test_end_whose_last_write_shows_a_gateway_writes_once_more() -> None:
+    """The gateway may deliver what others sent before the port was opened (rule 10)."""
+    one = tell(SCENES['little sts'], story_of('during 1: reload same\nwrite 2: sts last'))
+    assert one is not None
+    assert one.came[3:6] == ('beat_1 = 0', 'w0_1 = 32000', 'w0_1 = 32000 late')
+
+
 def _always(value: object) -> Callable[..., object]:
     return lambda *arguments, **named: value
 
 
 @pytest.mark.parametrize(('owner', 'name', 'made', 'scene', 'story', 'check'), [
-    (Words, 'lands_until', property(_always(-math.inf)), 'little sts', 'write 2: kept last',
-     'Belief'),
+    (Words, '_lands', _always(-math.inf), 'little sts', 'write 2: kept last', 'Belief'),
     (Flights, 'take_over', _always(None), 'little gets',
      'write 1: kept last\nduring 1: reload same', 'Belief'),
-    (Flights, 'gateway_replied', _always(None), 'little free',
+    (Flights, 'has_gateway', _always(False), 'little free',
      'at 0.5: before speed last\nwrite 3: not delivered', 'Belief'),
-    (Words, 'plan_again', _always(None), 'little beat', 'write 2: kept last', 'Belief'),
+    (Words, 'again_at', _always(math.inf), 'little beat', 'write 2: kept last', 'Belief'),
     (Interlocks, 'unconfirmed', _always([]), 'little end', 'write 2: kept 2\nat 0.95: end 0.3',
      'Named'),
-    (FallbackRow, 'write_ended', _always(None), 'little sts', '', 'Belief')])
+    (Words, 'are_ours', lambda self, but=None: self.last is not None, 'little sts', '',
+     'Belief')])
 def test_story_shows_a_mistake(owner: type, name: str, made: Any, scene: str, story: str,
                                check: str) -> None:
     assert tell_broken(scene, story) == ''
@@ -93,7 +99,7 @@ def tell_broken(scene: str, story: str) -> str:
 def test_story_is_its_text_and_is_shortened() -> None:
     text = 'at 1.2: message\nwrite 2: kept last'
     assert text_of(story_of(text)) == text
-    with mock.patch.object(Words, 'lands_until', property(_always(-math.inf))):
+    with mock.patch.object(Words, '_lands', _always(-math.inf)):
         longest = {'at 1.2': 'guest speed', 'write 2': 'kept last'}
         assert shortest(SCENES['little sts'], longest) == {'write 2': 'kept last'}
 
