@@ -62,6 +62,7 @@ PARTS: dict[tuple[str, str], Callable[[], str]] = {
     (f'{REFERENCE}/addresses.md', 'packets'): tables.packets,
     (f'{REFERENCE}/parameters.md', 'parameters'): tables.parameters,
     (f'{REFERENCE}/topics.md', 'outcomes'): tables.outcomes,
+    (f'{REFERENCE}/topics.md', 'reasons'): tables.write_reasons,
     (f'{REFERENCE}/counters.md', 'counters'): tables.counters,
     **{(f'{REFERENCE}/messages.md', severity.value): partial(tables.messages, severity)
        for severity in Severity},

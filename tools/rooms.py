@@ -86,6 +86,8 @@ ROOMS = (
          ('errors', 'messages', 'problems', 'numbers', 'text', 'line_names', 'df1', 'pccc')),
     Room(('plan',), 'the read plan: blocks, their cost on the line, bounds and remarks',
          ('errors', 'problems', 'text', 'df1', 'pccc', 'settings')),
+    Room(('ages.py',), 'the age of a message, as far as clocks can be trusted',
+         ('errors', 'settings')),
     Room(('driver',), 'the plan carried out: order of commands, points, served words',
          (*_BASE, 'text', 'df1', 'pccc', 'settings', 'plan', 'sniffer')),
     Room(('ports',), 'ports, the thread that runs a link, recording and listening',

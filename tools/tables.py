@@ -26,6 +26,7 @@ from abdf1_ros.counters import numbered
 from abdf1_ros.df1.frames import Code
 from abdf1_ros.diagnosis.causes import diagnose, RULES
 from abdf1_ros.driver.guest_rules import right_for
+from abdf1_ros.driver.writes.reasons import IN_ORDER
 from abdf1_ros.messages import Message, Severity
 from abdf1_ros.numbers import ValueKind
 from abdf1_ros.pccc.access import Access
@@ -211,6 +212,11 @@ def counters() -> str:
         (str(entry.metadata['number']), entry.metadata['mnemonic'],
          entry.metadata['description'], _linked(COUNTERS[entry.name]))
         for entry in numbered()))
+
+
+def write_reasons() -> str:
+    """Return why a message is not taken, in the order of the reasons."""
+    return '\n'.join(f'{number}. {words}' for number, words in enumerate(IN_ORDER, 1))
 
 
 def outcomes() -> str:

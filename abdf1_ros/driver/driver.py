@@ -70,6 +70,7 @@ from abdf1_ros.driver.served import Served
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome, show, Write, WriteResult
 from abdf1_ros.driver.writes.queue import MAX_WAITING_WRITES, WriteQueue
+from abdf1_ros.driver.writes.reasons import WriteReasons
 from abdf1_ros.driver.writes.under_way import is_message_of, WritesUnderWay
 from abdf1_ros.errors import FormatError, INTERNAL_ERROR, PortLost
 from abdf1_ros.messages import Event
@@ -199,9 +200,8 @@ class Driver:
         May be called from any thread, followed by ``LinkThread.wake``. Exactly one WriteResult
         follows for each mapping, at once when the request is refused; each contains ``request``.
         """
-        reason = self._why_nothing_is_written(len(mappings))
-        if reason:
-            self.refuse(mappings, reason, values, request)
+        if refused := self._reasons_at_once(len(mappings)).first:
+            self.refuse(mappings, refused[1], values, request)
             return
         writes, reasons = [], {}
         for mapping in mappings:
@@ -219,15 +219,23 @@ class Driver:
             if not self._inbox.put(write):
                 self.refuse([write.mapping], _NOT_OPEN, values, request)
 
-    def _why_nothing_is_written(self, count: int) -> str:
-        """Return why no write of ``count`` mappings is accepted now, empty if it is."""
-        if self._settings.read_only:
-            return 'this node is read_only'
-        if not self.is_online:
-            return _NOT_OPEN
-        if self.interlocks.is_ending:
-            return ENDS
-        return TOO_MANY if len(self._inbox) + count > MAX_WAITING_WRITES else ''
+    def _reasons_at_once(self, count: int) -> WriteReasons:
+        """Return what is against all writes of ``count`` mappings now, in any thread."""
+        return WriteReasons(
+            read_only='this node is read_only' if self._settings.read_only else '',
+            closed='' if self.is_online else _NOT_OPEN,
+            ends=ENDS if self.interlocks.is_ending else '',
+            crowded=TOO_MANY if len(self._inbox) + count > MAX_WAITING_WRITES else '')
+
+    def _reasons_in_turn(self, write: Write, now: float) -> WriteReasons:
+        """Return what is against a message that comes to the link's thread."""
+        own, must_be_heard = self.interlocks, not write.mapping.serves and any(self.stations)
+        return WriteReasons(
+            publishers=own.why_refused(write),
+            overruled='fallback' if own.is_overruled(write) else '',
+            put_off='fallback' if own.is_put_off(write) else '',
+            waited=self._writes.why_too_old(write, now),
+            unheard=_NOT_HEARD if must_be_heard and not self.tasks.is_heard else '')
 
     def read_now(self, mapping: Mapping, answer: Callable[[ReadAnswer], None]) -> None:
         """
@@ -323,22 +331,13 @@ class Driver:
             self._writes.drop(why, now, mapping)
             self.tasks.stop(partial(is_message_of, mapping), why)
         for write in self._inbox.take():
-            if reason := self.interlocks.why_refused(write):
-                self._end_write(write, Outcome.REFUSED, reason)
-                continue
-            if self.interlocks.is_overruled(write):
-                self._end_write(write, Outcome.NOT_SENT, 'fallback')
-                continue
-            self.interlocks.message_came(write)
-            if self.interlocks.is_put_off(write):
-                self._end_write(write, Outcome.NOT_SENT, 'fallback')
-            elif reason := self._writes.why_too_old(write, now):
-                self._end_write(write, Outcome.NOT_SENT, reason)
+            reasons = self._reasons_in_turn(write, now)
+            if not reasons.publishers and not reasons.overruled:
+                self.interlocks.message_came(write)
+            if reasons.first:
+                self._end_write(write, *reasons.first)
             elif not write.mapping.serves:
-                if self.tasks.is_heard or not any(self.stations):
-                    self._writes.add(write, now)
-                else:
-                    self._end_write(write, Outcome.NOT_SENT, _NOT_HEARD)
+                self._writes.add(write, now)
             else:
                 self.served.store(write.mapping, write.raw)
                 self._flights.ended(self._flights.begin(

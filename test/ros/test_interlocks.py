@@ -25,9 +25,13 @@ from typing import Any
 from abdf1_ros.client import Client
 from abdf1_ros.df1.echo import COMES_BACK
 from abdf1_ros.df1.frames import Frame, NAK, Symbol
+from abdf1_ros.df1.peer import PEER
+from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.errors import RemoteError
+from abdf1_ros.open_line import OpenLine
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.steps import AddressedValues, echo, write
+from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.simulator.ladder import Lamp
 import pytest
 from rclpy.clock import ClockType
@@ -75,6 +79,12 @@ class Cell(ros.BridgeCell):
         """Return a guest at a place of the bridge, which is there soon."""
         self.until(place.exists, 'the place')
         return Client(str(place), plc_type='SLC', timeout=3.0, cmd_timeout=3.0)
+
+    def open_place(self, place: Path) -> OpenLine:
+        """Return a guest that sends any command."""
+        self.until(place.exists, 'the place')
+        return OpenLine(PEER, LinkSettings(timeout=3.0, cmd_timeout=3.0),
+                        PortSettings(str(place)))
 
     def until_counting(self) -> None:
         """Wait until the heartbeat counts."""
@@ -282,7 +292,7 @@ def test_rule_3_guests_command_that_the_plc_does_not_take_changes_no_heartbeat_a
                 cell.until_beats(10)  # no guest has the line for a while
             return 0 not in beats[first:] and len(doors) - reads > len(beats) - first
 
-        with cell.share(place) as hmi:
+        with cell.open_place(place) as hmi:
             assert any(goes_on() for _ in range(ATTEMPTS))
         assert statuses & {0x02, 0x05}  # it was sent
     assert capfd.readouterr().err.count(' gets no reply from station 1 to echo ') == 1
@@ -294,7 +304,7 @@ def test_rule_8_broadcast_of_a_guest_over_a_fallback_is_told_and_written_over(
     with Cell(tmp_path, f'net.share:="pty:{place}"', 'net.share_access:=All') as cell:
         cell.until_counting()
         written = watched(cell, 'N10:1')
-        with cell.share(place) as hmi:
+        with cell.open_place(place) as hmi:
             for word, value in ('N10:0', 1), ('N10:1', 99):
                 for _ in range(ATTEMPTS):
                     with pytest.raises(RemoteError) as caught:

@@ -46,6 +46,7 @@ import math
 from random import Random
 from typing import NamedTuple, Protocol
 
+from abdf1_ros.ages import Ages, HostClock, most_ahead
 from abdf1_ros.df1.frames import ACK, DLE, Duplex, SOH, stuff, STX
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.settings import LinkSettings, PollingSettings
@@ -56,7 +57,6 @@ from abdf1_ros.driver.guests import Guest, GuestCommand
 from abdf1_ros.driver.interlocks.own import Crowd
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import WriteResult
-from abdf1_ros.driver.writes.ages import Ages, HostClock, most_ahead
 from abdf1_ros.errors import FormatError, LinkError, PortLost
 from abdf1_ros.pccc.address import Address, Area
 from abdf1_ros.pccc.emulated import Setting

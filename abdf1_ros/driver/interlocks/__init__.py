@@ -17,5 +17,5 @@ Writes of the bridge itself: heartbeats and fallback values (docs/heartbeats.md)
 
 - ``queue``: at each turn of the line it returns the write that is due.
 - ``plc``: the rows of one station, and which of them goes first.
-- ``heartbeat``, ``fallback``: one row each, with the rules that it keeps; ``own``: what they share.
+- ``heartbeat``, ``fallback``: one row each, with its rules; ``own``: what they share.
 """

@@ -16,5 +16,5 @@
 Messages on their way to a PLC: the queue, the packets, and the end of each.
 
 ``queue`` has the messages that wait for the line, ``under_way`` the writes that have it,
-``packets`` the commands of one write.
+``packets`` the commands of one write, ``reasons`` why a message is not taken.
 """

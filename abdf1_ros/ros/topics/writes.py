@@ -29,9 +29,9 @@ import math
 import time
 from typing import Protocol
 
+from abdf1_ros.ages import Ages, HostClock, most_ahead, RecentMax, REMEMBERED
 from abdf1_ros.driver.driver import Driver, TOO_MANY
 from abdf1_ros.driver.interlocks.own import Crowd
-from abdf1_ros.driver.writes.ages import Ages, HostClock, most_ahead, RecentMax, REMEMBERED
 from abdf1_ros.driver.writes.queue import MAX_WAITING_WRITES
 from abdf1_ros.errors import FormatError
 from abdf1_ros.ports.clock import line_time

@@ -44,6 +44,7 @@ from unittest import mock
 if __name__ == '__main__':  # pytest has its own paths
     sys.path[:0] = [str(Path(__file__).parents[number]) for number in (1, 2, 3)]
 
+from abdf1_ros.ages import HostClock, RecentMax
 from abdf1_ros.df1.machine import Machine
 from abdf1_ros.df1.master import HalfDuplexMaster
 from abdf1_ros.df1.odd import OddCommands
@@ -62,7 +63,6 @@ from abdf1_ros.driver.reads.guards import CounterGuard, RunGuard
 from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.driver.served import MappedTable
 from abdf1_ros.driver.write import Outcome, Write, WriteResult
-from abdf1_ros.driver.writes.ages import HostClock, RecentMax
 from abdf1_ros.driver.writes.queue import WriteQueue
 from abdf1_ros.driver.writes.under_way import WriteJob
 from abdf1_ros.pccc.values import Codec

@@ -14,7 +14,7 @@
 
 """The age of a message by clocks that are ahead, are set, or stand still with their process."""
 
-from abdf1_ros.driver.writes.ages import Ages, HostClock, most_ahead, RecentMax
+from abdf1_ros.ages import Ages, HostClock, most_ahead, RecentMax
 from abdf1_ros.errors import FormatError
 from abdf1_ros.settings.heartbeats import Fallback, While
 import pytest
