@@ -68,7 +68,7 @@ def test_marked_blocks_do_what_they_show(name: str, port: Path, tmp_path: Path,
             line, *shown = part.splitlines()
             command, *args = shlex.split(line.removeprefix('abdf1 '))
             if command in COMMANDS:
-                if {'detect', 'read'} & {*args}:  # a scan would wait for 6 silent stations
+                if {'detect', 'read', 'log'} & {*args}:  # a scan would wait for 6 silent stations
                     args += PATIENT
                 said = call(import_module(COMMANDS[command][0]).main, capsys, *args)
                 assert said.status == 0, f'{line}: {said}'
