@@ -322,6 +322,8 @@ def test_log_refuses_what_it_cannot_do_before_it_asks_a_plc(tmp_path: Path, caps
     for to, text in ((path, 'is not a log of this form'), (tmp_path, 'Is a directory')):
         said = call(main, capsys, 'log', 'N7:0', '--to', str(to), *port)
         assert said.status == 2 and text in said.err and said.err.count('\n') == 1
+    assert call(main, capsys, 'log', 'N7:0', 'shift.csv', *port) == Said(
+        2, '', 'plc: shift.csv: give the file as --to shift.csv\n')
     to = tmp_path / 'new.csv'
     said = call(main, capsys, 'log', 'N7:0', '--to', str(to), *port)
     assert said.status == 1 and not to.exists()

@@ -23,6 +23,7 @@ Log values to a file that is continued: each read, and the reason of each gap.
 from __future__ import annotations
 
 import argparse
+import re
 
 from abdf1_ros.cli.plc.log import log_values
 from abdf1_ros.cli.plc.log_file import FORMS, LogFile, LogOutput
@@ -30,6 +31,9 @@ from abdf1_ros.cli.plc.options import add_addresses, add_repetition
 from abdf1_ros.cli.plc.session import complain
 from abdf1_ros.cli.plc.targets import to_read
 from abdf1_ros.paths import expanded
+from abdf1_ros.problems import ConfigurationError, Problem
+
+_FILE = re.compile(r'[^:]+\.(csv|jsonl?|txt|log|influx)', re.IGNORECASE)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -45,6 +49,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Log the values of addresses or rows; in Mode Listen those that another master reads."""
+    if file := next((word for word in options.addresses if _FILE.fullmatch(word)), None):
+        raise ConfigurationError([Problem(file, f'give the file as --to {file}')])
     targets, form = to_read(options), FORMS[options.format]
     if options.to is None:
         return log_values(options, targets, LogOutput(form), may_listen=True)
