@@ -449,3 +449,15 @@ def test_rule_19_own_values_are_never_taken_for_those_of_another(polling: str) -
     cell.run(15.0)
     assert cell.bench.listener.foreign == []
     assert cell.word('N10:0') > 3  # after each 0 it stands for half a second
+
+
+def test_rule_19_0_of_a_new_contact_is_not_longer_for_an_earlier_foreign_value() -> None:
+    beat = (one := OneBeat()).beat
+    beat.begin(0.0)
+    one.begin(0.0)
+    one.end(0.1)
+    assert beat.read_back(5, 0.1, 0.2)
+    beat.begin(1.0, is_new=True)
+    one.begin(1.0)
+    one.end(1.1)
+    assert one.look(1.1) == 1.1 + 0.5

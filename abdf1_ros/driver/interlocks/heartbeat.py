@@ -72,7 +72,7 @@ class OtherWriter:
         self._period = period
         self._dice = dice
         self._zeros = 0  # 0s written again while the other bridge continues
-        self.extra_zero = 0.0  # s, until the heartbeat counts again
+        self.extra_zero = 0.0  # s, until the heartbeat counts or begins again
 
     def note_value(self, now: float) -> bool:
         """Record a foreign value; return True if one was seen recently before."""
@@ -177,6 +177,7 @@ class HeartbeatRow(SelfWritten):
         to RUN. Otherwise the reply to a 0 may be the contact; this 0 need not be written again.
         """
         self.is_taken &= not is_new
+        self._other.extra_zero = 0.0
         self.counts, latest = False, self.latest
         is_reply = latest is not None and (latest.outcome is None or latest.done == now)
         if is_new or self.value or not is_reply:
