@@ -518,7 +518,9 @@ IGNITION = """\
 
 
 def test_tags_of_ignition(tmp_path: Path) -> None:
-    other = IGNITION.replace('[MLX]N7:1', '[SLC]N7:1')
+    other = IGNITION.replace('[MLX]N7:1', '[SLC]N7:1').replace('  {', '\t{').replace(
+        '"rawHigh": 100', '"rawHigh": 16.384')
+    assert 'Line 1/Speed' in imported(tmp_path, other, Wanted(node='MLX'))[0][0].tag
     assert [text[:3] for text in imported(tmp_path, other, Wanted(node='MLX'))[1]] == ['11:']
     (speed, wait), left_out = imported(tmp_path, IGNITION)
     assert [cell_of(speed, column) for column in (

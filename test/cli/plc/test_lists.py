@@ -298,7 +298,7 @@ def test_names_of_columns_stand_below_titles_and_come_again(tmp_path: Path) -> N
      'each PLC, or no titles)'),
     ('North,,\nRun1,B3:0/1,RW\nSouth,,\nRun2,B3:0/2,RW\n', ['ReadWrite', 'ReadWrite'], ''),
     ('PLC 1,,\nRun1,B3:0/1,RW\nRun2,B3:0/2,RW\n', ['ReadWrite', 'ReadWrite'], ''),
-    ('P1.Run,B3:0/1,RW\nP2.Run,b3:0/1,RW\nRun3,B3:0/3,RW\n', ['Read', 'Read', 'ReadWrite'],
+    ('P1.Run,B3:0/1,RW\nP2.Run,b3/001,RW\nRun3,B3:0/3,RW\n', ['Read', 'Read', 'ReadWrite'],
      'its address stands in another row, too, as if it were of another PLC: made Read rows')])
 def test_rows_that_may_belong_to_several_plcs_only_read(
         tmp_path: Path, text: str, commands: list[str], remark: str) -> None:
@@ -438,6 +438,28 @@ def test_types_of_ignition_are_not_those_of_the_plc(tmp_path: Path) -> None:
     assert cells(tmp_path, 'Tag', 'Address', 'Type') == [('Tanks/Level', 'N7:20', 'int16')]
 
 
+@for_all(('head', 'cell', 'told'), [
+    ('Device', 'PLC2', 'has rows of several PLCs: PLC1, PLC2'),
+    ('Machine', 'Press', 'has rows of several PLCs: PLC1, Press'), ('Converter', 'x10', 'Read')])
+def test_columns_that_people_add_to_an_export_count(
+        tmp_path: Path, head: str, cell: str, told: str) -> None:
+    kepserver = (f'{head},Tag Name,Address,Data Type,Client Access,Scan Rate\n'
+                 f'PLC1,Run1,B3:0/1,Boolean,R/W,100\n{cell},Run2,B3:0/1,Boolean,R/W,100\n')
+    view = (f';Tag Type,Tag Name,Read Only,Data Source,Native Type,Address,{head}\n'
+            f'D,Run1,F,D,,B3:0/1,PLC1\nD,Run2,F,D,,B3:0/1,{cell}\n')
+    for text in (kepserver, view):
+        if told == 'Read':
+            assert made(tmp_path, text).remarks[f'column "{head}"{STRANGE}'] == 2
+            assert cells(tmp_path, 'Command') == [('Read',)] * 2
+        else:
+            assert told in refusal(tmp_path, text)
+
+
+def test_columns_of_short_rows_are_compared_as_they_stand(tmp_path: Path) -> None:
+    text = 'Tag,Address,Access,Channel,Device\na,N7:0,RW,1,A\nb\nc,N7:0,RW,1,B\n'
+    assert 'several PLCs: A, B;' in refusal(tmp_path, text)
+
+
 def test_input_of_a_list_without_its_word_is_only_read(tmp_path: Path) -> None:
-    made(tmp_path, 'Tag,Address,Access\na,O:3/1,RW\nb,O:3.0/1,RW\n')
+    made(tmp_path, 'Tag,Address,Access\na,O:3/1,RW\nb,O:3.0/2,RW\n')
     assert cells(tmp_path, 'Tag', 'Command') == [('a', 'Read'), ('b', 'ReadWrite')]

@@ -45,15 +45,31 @@ def _of_kepserver(address: str, kind: str | None,
                    + (', or an even number of characters from an even one on' if count else ''))
 
 
+_PLC = {role: words.split() for role, words in {  # of people's own columns in an export, too
+    Role.PLC: 'plc plcname plcid plcno plcnumber plctype controller controllername cpu cpuname '
+              'processor processorname device devicename deviceid deviceno iodevice iodevicename '
+              'node nodename nodeid nodeno nodenumber nodeaddress connection connectionname '
+              'channel channelname driver drivername topic topicname ddetopic accessname '
+              'accesspath shortcut shortcutname server servername opcserver ioserver host '
+              'hostname ip ipaddress network port comport slave slaveid slaveaddress unitid rtu '
+              'provider devicegroup steuerung steuerungsname sps spsname gerät geraet gerätename '
+              'automate autómata automata plcdevice source datasource target stationname '
+              'remotenode remotestation destination',
+    Role.PLACE: 'machine machinename cell cellname area areaname line linename plant site system '
+                'systemname equipment skid maschine anlage linie zone ligne',
+    Role.STATION: 'station stationnumber stationno stationaddress stationnr plcstation stationid '
+                  'stationsnummer'}.items()}
+
 KEPSERVER = Form(
     'tags of KEPServerEX (File, Export CSV)',
-    [{'tagname', 'address', 'datatype', 'clientaccess'}], {
+    [{'tagname', 'address', 'datatype', 'clientaccess'}], _PLC | {
         Role.TAG: ['tagname'], Role.ADDRESS: ['address'], Role.TYPE: ['datatype'],
         Role.ACCESS: ['clientaccess'], Role.PERIOD: ['scanrate'], Role.SCALING: ['scaling'],
         Role.RAW_LOW: ['rawlow'], Role.RAW_HIGH: ['rawhigh'], Role.LOW: ['scaledlow'],
         Role.HIGH: ['scaledhigh'], Role.CLAMP_LOW: ['clamplow'], Role.CLAMP_HIGH: ['clamphigh'],
         Role.NEGATE: ['negatevalue'], Role.DESCRIPTION: ['description'],
-        Role.UNIT: ['engunits', 'engineeringunits']},
+        Role.UNIT: ['engunits', 'engineeringunits'],
+        Role.UNUSED: ['respectdatatype', 'scaleddatatype']},
     lambda text: {
         'default': '', 'boolean': 'bool', 'short': 'int16', 'word': 'uint16', 'long': 'int32',
         'dword': 'uint32', 'float': 'float32', 'bcd': 'bcd16', 'string': 'string',
@@ -71,11 +87,14 @@ def _tag_of_factorytalk(cells: dict[str, str]) -> str | None:
 
 
 FACTORYTALK = Form(
-    'tags of RSView32 or FactoryTalk View', [{'tagtype', 'tagname', 'datasource'}], {
+    'tags of RSView32 or FactoryTalk View', [{'tagtype', 'tagname', 'datasource'}], _PLC | {
         Role.TAG: ['tagname'], Role.ADDRESS: ['address'], Role.TYPE: ['nativetype'],
-        Role.READ_ONLY: ['readonly'], Role.PLC: ['nodename'], Role.UNIT: ['units'],
+        Role.READ_ONLY: ['readonly'], Role.UNIT: ['units'],
+        Role.PLC: [name for name in ('nodename', *_PLC[Role.PLC]) if name != 'datasource'],
         Role.DESCRIPTION: ['tagdescription'], Role.SCALE: ['scale'], Role.OFFSET: ['offset'],
-        Role.MIN: ['minanalog'], Role.MAX: ['maxanalog']},
+        Role.MIN: ['minanalog'], Role.MAX: ['maxanalog'],
+        Role.UNUSED: ['tagtype', 'datasource', 'security*', 'alarm*', 'datalogged', 'valuetype',
+                      'initial*', 'deadband', '*label*', 'length*', 'scanclass', 'retentive']},
     lambda text: {
         '': '', 'd': '', 'i': 'int16', 'u': 'uint16', 'l': 'int32', 'f': 'float32', '3': 'bcd12',
         '4': 'bcd16'}.get(text.lower()),
@@ -110,7 +129,7 @@ INTOUCH = Form(
         Role.READ_ONLY: ['readonly'], Role.DESCRIPTION: ['comment'], Role.UNIT: ['engunits'],
         Role.SCALING: ['conversion'], Role.RAW_LOW: ['minraw'], Role.RAW_HIGH: ['maxraw'],
         Role.LOW: ['mineu'], Role.HIGH: ['maxeu'], Role.MIN: ['mineu'], Role.MAX: ['maxeu'],
-        Role.INVERT: ['dconversion']},
+        Role.INVERT: ['dconversion'], Role.UNUSED: ['*']},
     prepare=_tag_of_intouch, adapt=_of_intouch, mark=':')
 
 
@@ -124,7 +143,7 @@ IGNITION = Form(
         Role.TAG: ['name'], Role.ADDRESS: ['opcitempath'], Role.READ_ONLY: ['readonly'],
         Role.DESCRIPTION: ['documentation'], Role.UNIT: ['engunit'], Role.SCALING: ['scalemode'],
         Role.RAW_LOW: ['rawlow'], Role.RAW_HIGH: ['rawhigh'], Role.LOW: ['scaledlow'],
-        Role.HIGH: ['scaledhigh']},
+        Role.HIGH: ['scaledhigh'], Role.UNUSED: ['valuesource']},
     prepare=_tag_of_ignition, path='ns=1;s=[PLC]N7:0')
 
 # Symbols of RSLogix have no row of names. A line is: address, perhaps scope, symbol, description.
@@ -167,7 +186,7 @@ def _type_of(text: str) -> str | None:
 
 
 LIST = Form(
-    'a list with a row that names its columns (--tag COLUMN --address COLUMN)', (), {
+    'a list with a row that names its columns (--tag COLUMN --address COLUMN)', (), _PLC | {
         role: words.split() for role, words in {
             Role.TAG: 'tagname tag symbol symbolname devicetag tagpath name *tagname variable '
                       'varname variablename signal signalname point pointname tagno tagnr '
@@ -191,20 +210,6 @@ LIST = Form(
                             'writeprotected isreadonly',
             Role.WRITABLE: 'write writable writeable iswritable writeaccess writeenable '
                            'writeenabled canwrite allowwrite schreibbar beschreibbar inscriptible',
-            Role.PLC: 'plc plcname plcid plcno plcnumber plctype controller controllername cpu '
-                      'cpuname processor processorname device devicename deviceid deviceno '
-                      'iodevice iodevicename node nodename nodeid nodeno nodenumber nodeaddress '
-                      'connection connectionname channel channelname driver drivername topic '
-                      'topicname ddetopic accessname accesspath shortcut shortcutname server '
-                      'servername opcserver ioserver host hostname ip ipaddress network port '
-                      'comport slave slaveid slaveaddress unitid rtu provider devicegroup '
-                      'steuerung steuerungsname sps spsname gerät geraet gerätename automate '
-                      'autómata automata plcdevice source datasource target stationname '
-                      'remotenode remotestation destination',
-            Role.PLACE: 'machine machinename cell cellname area areaname line linename plant site '
-                        'system systemname equipment skid maschine anlage linie zone ligne',
-            Role.STATION: 'station stationnumber stationno stationaddress stationnr plcstation '
-                          'stationid stationsnummer',
             Role.BIT: 'bit bitnumber bitno bitnr bitposition bitpos bitindex subelement',
             Role.LENGTH: 'length elements numberofelements elementcount noofelements arraysize '
                          'arraylength arrayelements array arraycount count länge laenge anzahl '

@@ -73,7 +73,8 @@ def import_map(path: str, wanted: Wanted) -> Import:
     """
     _refuse_values(path)
     sheet = read_sheet(path)
-    sheet = replace(sheet, records=records_of(sheet.text) or sheet.records)
+    if tags := records_of(sheet.text):
+        sheet = replace(sheet, records=tags, is_dot_unclear=False)
     table = table_of(sheet, wanted)
     rows = [(record, entry if isinstance(entry, Ignored) else read_row(
         table.form, entry, wanted)) for record, entry in table.rows]

@@ -78,7 +78,7 @@ class Sheet:
     """
     The records of a file that are not empty.
 
-    With ``is_dot_unclear`` a semicolon divides cells, as where 1.500 may be 1500. ``remark`` says
+    With ``is_dot_unclear`` no comma divides cells, as where 1.500 may be 1500. ``remark`` says
     what had to be guessed.
     """
 
@@ -93,7 +93,7 @@ def read_sheet(path: str) -> Sheet:
     """Return the cells of a CSV file; raises ConfigurationError, as for a file of another kind."""
     text, remark = _text_of(path)
     delimiter = _delimiter(text)
-    return Sheet(path, text, list(_records(path, text, delimiter)), delimiter == ';', remark)
+    return Sheet(path, text, list(_records(path, text, delimiter)), delimiter != ',', remark)
 
 
 def _records(path: str, text: str, delimiter: str) -> Iterator[Record]:

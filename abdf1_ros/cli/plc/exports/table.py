@@ -21,7 +21,8 @@ A column is used, or it is named as not used, or rows with text in it do not wri
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 import re
@@ -80,7 +81,7 @@ class _Columns:
     The columns below a row of names.
 
     Each has a key, its heading. ``names`` has the names of the file by key, ``roles`` the keys by
-    role. Keys without a role are not understood, if the form is open.
+    role. Keys without a role are not understood.
     """
 
     form: Form
@@ -95,13 +96,15 @@ class _Columns:
         if (what := self.form.prepare(texts)) is not None:
             return Ignored(what), []
         known = {key for keys in self.roles.values() for key in keys}
-        strange = [key for key in keys if key not in known] if self.form.is_open else []
+        strange = [key for key in keys if key not in known and (
+            self.form.is_open or key in self.names)]
+        unused = self.roles[Role.UNUSED] if self.form.is_open else []
         cells: dict[Role, list[tuple[str, str]]] = {
             role: [(self.names[key], texts.get(key, '')) for key in keys]
             for role, keys in self.roles.items() if role is not Role.UNUSED}
         node = '/'.join(filter(None, (text for _, text in cells.pop(Role.PLC, ()))))
         told = {key: self.names.get(key, key.replace('.', 'cell'))
-                for key in (*strange, *self.roles[Role.UNUSED])
+                for key in (*strange, *unused)
                 if texts.get(key, '') not in _NOTHING}
         return (ListRow(record, cells, node, [told[key] for key in strange if key in told],
                         (), sheet.is_dot_unclear), list(told.values()))
@@ -155,13 +158,16 @@ def _read(form: Form, sheet: Sheet, wanted: Wanted, head: Record | None = None) 
                     title = ' '.join(record.cells).strip()
                 sections.setdefault(title, set()).add(found[Role.ADDRESS])
         table.rows.append((record, found))
-    return _with_doubles(table, _mixed(sections)) if form.is_open else table
+    return _with_doubles(table, _mixed(sections), wanted) if form.is_open else table
 
 
-def _with_doubles(table: Listing, reason: str) -> Listing:
+def _with_doubles(table: Listing, reason: str, wanted: Wanted) -> Listing:
     """Return the rows; ``reason`` is why none may write, and a row like another has its own."""
     def place(row: ListRow) -> tuple[str, ...]:
-        return row.node, row[Role.STATION], row[Role.ADDRESS].upper(), row[Role.BIT]
+        text = '/'.join(filter(None, (row[Role.ADDRESS], row[Role.BIT])))
+        with suppress(FormatError):
+            text = str(parse_address(text, wanted.plc_type))
+        return row.node, row[Role.STATION], text.upper()
 
     count = Counter(place(row) for _, row in table.rows if isinstance(row, ListRow))
     for number, (record, row) in enumerate(table.rows):
@@ -216,16 +222,21 @@ def _columns(form: Form, sheet: Sheet, head: Record, wanted: Wanted) -> _Columns
     for number, name in enumerate(head.cells, 1):
         key = heading(name) or f'. {number}'
         names[key if key not in names else f'{key} {number}'] = name or f'cell {number}'
-    if not form.is_open:
-        return _Columns(form, names, _roles(form, list(names)) | {Role.UNUSED: []})
     roles: dict[Role, list[str]] = {Role.UNUSED: []} | _roles(form, list(names))
-    _give(sheet, head, names, roles, wanted)
+    if form.mark:
+        return _Columns(form, names, roles)
+    if form.is_open:
+        _give(sheet, head, names, roles, wanted)
     for role in (Role.TAG, Role.ADDRESS):
         if role not in roles:
             raise ConfigurationError([Problem(Place(sheet.path, head.line), (
                 f'which column is the {role.value}? Say --{role.value} COLUMN; columns: '
                 f'{_listed(head)}'))])
-    _choose(sheet, head, names, roles)
+    texts = {key: [''.join(record.cells[number:number + 1]) for record in sheet.records
+                   if record.line > head.line] for number, key in enumerate(names)}
+    if form.is_open:
+        _mistrust(names, texts, roles)
+    _choose(texts, roles)
     return _Columns(form, names, roles)
 
 
@@ -258,17 +269,9 @@ def _give(sheet: Sheet, head: Record, names: dict[str, str], roles: dict[Role, l
         del roles[role]
 
 
-def _choose(sheet: Sheet, head: Record, names: dict[str, str],
-            roles: dict[Role, list[str]]) -> None:
-    """Keep the best column of each role; what is left over has no role, or is not used."""
-    texts = {key: [record.cells[number] for record in sheet.records
-                   if record.line > head.line and number < len(record.cells)]
-             for number, key in enumerate(names)}
-    places = roles.pop(Role.PLACE, [])
-    if Role.PLC in roles or Role.STATION in roles:
-        roles[Role.UNUSED] += places
-    else:
-        roles[Role.PLC] = places
+def _mistrust(names: dict[str, str], texts: Mapping[str, Sequence[str]],
+              roles: dict[Role, list[str]]) -> None:
+    """Take the role from columns of a list whose names may also mean something else."""
     if roles[Role.ADDRESS][0] == 'opcitempath':  # types of Ignition, not of the PLC
         roles[Role.UNUSED] += roles.pop(Role.TYPE, [])
     units = roles.get(Role.UNIT, [])
@@ -280,6 +283,15 @@ def _choose(sheet: Sheet, head: Record, names: dict[str, str],
     period = ''.join(names[key] for key in roles.get(Role.PERIOD, []))
     if period and 'ms' not in period and period.lower() != 'period':
         roles[Role.UNUSED] += roles.pop(Role.PERIOD)
+
+
+def _choose(texts: Mapping[str, Sequence[str]], roles: dict[Role, list[str]]) -> None:
+    """Keep the best column of each role; another column has no role, or is not used."""
+    places = roles.pop(Role.PLACE, [])
+    if Role.PLC in roles or Role.STATION in roles:
+        roles[Role.UNUSED] += places
+    else:
+        roles[Role.PLC] = places
     for role, keys in roles.items():
         if role is Role.PLC:
             roles[role] = _telling(keys, texts)
@@ -290,12 +302,12 @@ def _choose(sheet: Sheet, head: Record, names: dict[str, str],
             del keys[1:]
 
 
-def _telling(keys: Sequence[str], texts: dict[str, list[str]]) -> list[str]:
+def _telling(keys: Sequence[str], texts: Mapping[str, Sequence[str]]) -> list[str]:
     """Return the columns that tell PLCs apart which the columns before do not; at least one."""
     kept: list[str] = []
     parts = 1
     for key in keys:
-        count = len(set(zip(*(texts[other] for other in (*kept, key)), strict=False)))
+        count = len(set(zip(*(texts[other] for other in (*kept, key)), strict=True)))
         if count > parts:
             kept.append(key)
             parts = count
