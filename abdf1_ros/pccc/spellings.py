@@ -16,7 +16,15 @@
 
 from __future__ import annotations
 
-_FAMILIES = {'SLC500': 'SLC', 'SLC5/03': 'SLC', 'MICROLOGIX': 'SLC'}
+import re
+
+# Processors and catalog numbers of a family: 5/03, ML1400, 1747-L531; PLC-5/40, 1785-L40B.
+_FAMILIES = (
+    (re.compile(r'SLC(?:500|5/0[1-5])|5/0[1-5]|(?:MICROLOGIX|ML)(?:1[0-5]00)?|1747.*|176[1-6].*'),
+     'SLC'),
+    (re.compile(r'PLC5/\d\d.*|5/[1-8][05]|1785.*'), 'PLC5'))
+_MICROLOGIX = re.compile(r'(?:MICROLOGIX|ML)?(1[0-5]00)', re.IGNORECASE)
+_SLC = re.compile(r'(?:SLC-?)?5(?:[/-]0?|0)([1-5])', re.IGNORECASE)
 _TYPES = {'int': 'int16', 'word': 'uint16', 'dint': 'int32', 'long': 'int32', 'dword': 'uint32',
           'real': 'float32', 'float': 'float32', 'bit': 'bool'}
 
@@ -24,7 +32,15 @@ _TYPES = {'int': 'int16', 'word': 'uint16', 'dint': 'int32', 'long': 'int32', 'd
 def family_name(text: str) -> str:
     """Return the PLC_Type for a name such as PLC-5; any text in capitals, without - and spaces."""
     name = text.upper().replace('-', '').replace(' ', '')
-    return _FAMILIES.get(name, name)
+    return next((family for names, family in _FAMILIES if names.fullmatch(name)), name)
+
+
+def processor_name(text: str) -> str:
+    """Return the Processor for a name such as MicroLogix 1400 or SLC 5/3, or the text itself."""
+    name = text.replace(' ', '')
+    if match := _MICROLOGIX.fullmatch(name):
+        return f'ML{match[1]}'
+    return f'5/0{match[1]}' if (match := _SLC.fullmatch(name)) else text
 
 
 def type_name(text: str) -> str:

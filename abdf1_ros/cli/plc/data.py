@@ -173,7 +173,7 @@ def _meant(address: str) -> str:
     """Return what a user may have meant by a bad address."""
     if address.isdigit():
         return f'; a station is given with --station {address}'
-    parts = re.split('[, ]+', address.strip(', '))
+    parts = re.split('[,; ]+', address.strip(',; '))
     if len(parts) > 1 and all(map(looks_like_address, parts)):
         return f'; several addresses stand apart: {" ".join(parts)}'
     return ''
@@ -310,6 +310,8 @@ def _number(mapping: Mapping, text: str) -> float:
         unsigned = _UNSIGNED.get(kind)
         hint = f'; --type {unsigned.value} allows it' if unsigned and value is not None and (
             high < value <= unsigned.range[1]) else ''
+        if text in ('=', ':='):
+            hint = '; the values follow the address without it'
         raise FormatError(f'"{text}" is not a valid {kind.value}, {right}{hint}')
     return value
 

@@ -19,6 +19,7 @@ from __future__ import annotations
 import argparse
 from dataclasses import dataclass
 from enum import Enum
+import os
 
 from abdf1_ros.cli.plc.data import Radix
 from abdf1_ros.cli.plc.line import DEFAULTS, MODES
@@ -28,7 +29,7 @@ from abdf1_ros.paths import expanded
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.processor import Processor
-from abdf1_ros.pccc.spellings import family_name, type_name
+from abdf1_ros.pccc.spellings import family_name, processor_name, type_name
 from abdf1_ros.pccc.values import ValueType, WordOrder
 from abdf1_ros.settings import BAUD_RATES
 from abdf1_ros.settings.station_lists import parse_stations
@@ -97,7 +98,7 @@ def add_line_options(parser: argparse.ArgumentParser, defaults: LineDefaults,
                      has_link: bool = True) -> None:
     """Add the options of the line; ``has_link`` False leaves out duplex and --timeout."""
     group = parser.add_argument_group('line')
-    group.add_argument('--port', metavar='NAME', type=expanded,
+    group.add_argument('--port', metavar='NAME', type=_port,
                        help='serial port, or URL such as socket://192.168.0.9:4001')
     group.add_argument('--net', metavar='FILE', type=expanded,
                        help=f'take {defaults.net} from this net CSV; options override the file')
@@ -114,6 +115,11 @@ def add_line_options(parser: argparse.ArgumentParser, defaults: LineDefaults,
     if has_link:
         group.add_argument('--timeout', metavar='MS',
                            help=f'time to wait for each answer (default: {defaults.timeout})')
+
+
+def _port(text: str) -> str:
+    """Return the name of a port; ./line and ../line are paths of this folder."""
+    return os.path.abspath(text) if text.startswith(('./', '../')) else expanded(text)
 
 
 def _add_duplex(group: argparse._ArgumentGroup, defaults: LineDefaults) -> None:
@@ -138,8 +144,9 @@ def add_data_options(parser: argparse.ArgumentParser,
     group.add_argument('--type', type=type_name, choices=[kind.value for kind in ValueType],
                        help='type of the values (default: the natural type of the file)')
     _add_choice(group, '--word-order', WordOrder, '32-bit values: the word that comes first')
-    _add_choice(group, '--processor', Processor,
-                'processor of an SLC or MicroLogix (default: the PLC is asked)')
+    group.add_argument('--processor', type=processor_name,
+                       choices=[member.value for member in Processor], help=(
+                           'processor of an SLC or MicroLogix (default: the PLC is asked)'))
     _add_choice(group, '--access', Access,
                 'commands that reach the words, if a family has several ways')
 

@@ -26,6 +26,7 @@ from pathlib import Path
 from types import ModuleType
 
 from abdf1_ros.cli.terminal import command_parser
+from abdf1_ros.settings.hints import looks_like_address
 
 _STATUSES = """\
 exit status:
@@ -107,4 +108,6 @@ def check_order(parser: argparse.ArgumentParser, words: Sequence[str]) -> None:
     if first.startswith('-') and named:
         parser.error(f'options come after the command, as in "plc {named} ... {first} ..."')
     meant = difflib.get_close_matches(first.lower(), _verbs(), 1)
+    if looks_like_address(first):
+        meant = [f'plc read {first}']
     parser.error(f'"{first}" is not a command' + (f'; did you mean {meant[0]}?' if meant else ''))

@@ -373,6 +373,8 @@ OLE = bytes.fromhex('D0CF11E0A1B11AE1')
     ('a.md', b'| Tag | Address |\n| --- | --- |\n| a | N7:0 |\n', 'is a table of markdown'),
     ('a.txt', b'Speed   N7:0   line speed\nRun  B3:0/1\n',
      'has addresses, but blanks or other signs between its cells; put commas between them'),
+    ('net.csv', b'Com_Port,Baud,Station\n/dev/x,9600,0\n',
+     'is a net file: it has the settings of a line, and no tags'),
     ('a.slc', b'PROJECT "x"\nLADDER 2\n', 'is the text of a program; export its symbols')])
 def test_file_of_another_kind_is_told_by_its_sentence(
         tmp_path: Path, name: str, text: bytes, told: str) -> None:

@@ -61,6 +61,7 @@ def test_read_shows_address_and_values(
     (('2', 'N7:0'), '; a station is given with --station 2'),
     (('N7:0', '2'), '; a station is given with --station 2'),
     (('N7:0,N7:1',), '; several addresses stand apart: N7:0 N7:1'),
+    (('N7:0;N7:1',), '; several addresses stand apart: N7:0 N7:1'),
     (('N7:0 B3:0/1',), '; several addresses stand apart: N7:0 B3:0/1'),
     (('N7:0,x',), ''), (('--csv', 'N7:0'), 'plc read: error: "plc watch --csv --count 1" prints '
                         'values for programs'),

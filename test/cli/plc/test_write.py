@@ -197,6 +197,8 @@ def test_write_that_does_not_fit_the_family_of_the_plc(plc: Plc) -> None:
     (('watch', 'line_speed'), 'ADDRESS "line_speed": write type, file, ":", element, as in N7:0, '
                               'B3:1/5, T4:0.ACC or I:1.0/3\nplc: --map: if line_speed is a tag, '
                               'give its map with --map FILE'),
+    (('write', 'N7:0', '=', '5'), 'N7:0: "=" is not a valid int16, a whole number from -32768 to '
+     '32767; the values follow the address without it'),
     (('write', 'B3:0/1=on'), 'B3:0/1: "on" is not a valid bool, 0 or 1'),
     (('read', 'N7:0', 'B3:O'), 'ADDRESS "B3:O": that is the letter O where a digit should be; '
                                'write B3:0'),

@@ -178,6 +178,8 @@ def other_file(sheet: Sheet) -> str:
         return ('has tags of a Logix controller, which are not addresses. Over DF1 the '
                 'controller has only the addresses of its "Map PLC/SLC Messages": write these '
                 'rows by hand')
+    if any(cell.lower() == 'com_port' for record in sheet.records[:1] for cell in record.cells):
+        return 'is a net file: it has the settings of a line, and no tags'
     if _MARKDOWN.search(sheet.text):
         return 'is a table of markdown; write it with commas between the cells'
     if re.search(r'^\s*(?:PROJECT|LADDER|START\b.*\bEND$)', sheet.text, re.MULTILINE):
