@@ -19,8 +19,9 @@ Live: --port listens on a port that is wired to the line, and sends nothing. --t
 ports and passes all bytes on at once. A file is one of these:
 
 - a capture, from --save or from the parameter trace_file of the node
-- pcap or pcapng, from --pcapng, from an SEL RTAC, or with PCCC in EtherNet/IP
-- a hex dump from xxd or hexdump -C
+- pcap or pcapng: from --pcapng, of a device server (--tcp), of a USB adapter, from an SEL RTAC, or
+  with PCCC in EtherNet/IP
+- any text with the bytes: a dump, or the log of another program
 - raw bytes, with --binary
 
 An output line has the time in seconds, the direction, the station, the message or symbol, and the
@@ -72,9 +73,11 @@ from abdf1_ros.signals import limit_output, OUTPUTS
 from abdf1_ros.sniffer.capture import Chunk, LOST
 from abdf1_ros.sniffer.dumps import Recording
 from abdf1_ros.sniffer.entries import Entry
+from abdf1_ros.sniffer.ethernet_ip import DEVICE_SERVERS
 from abdf1_ros.sniffer.pcapng import PcapngWriter
 from abdf1_ros.sniffer.report import json_line, summary_json, summary_lines, text_line
 from abdf1_ros.sniffer.summary import Summary
+from abdf1_ros.sniffer.texts import TextProblem
 from abdf1_ros.sniffer.traffic import TrafficDecoder
 from abdf1_ros.text import counted, printable
 
@@ -290,8 +293,11 @@ def _decode(options: argparse.Namespace) -> int:
 def parse(args: Sequence[str] | None) -> argparse.Namespace:
     parser = command_parser('sniff', __doc__, _EPILOG)
     parser.add_argument('files', metavar='FILE', nargs='*', type=expanded,
-                        help='captures, pcap, pcapng or hex dumps, decoded in this order')
+                        help='recordings of any kind, decoded in this order')
     parser.add_argument('--binary', action='store_true', help='the files are raw bytes')
+    parser.add_argument('--tcp', metavar='PORT', type=whole_option, action='append',
+                        help='TCP port of the device server in pcap and pcapng (default: '
+                             f'{" and ".join(map(str, sorted(DEVICE_SERVERS)))})')
     parser.add_argument('--port', metavar='NAME', type=expanded,
                         help=f'listen on a serial port, {URLS}, pty, or pty:NAME')
     parser.add_argument('--tap', nargs=2, metavar=('PORT_A', 'PORT_B'), type=expanded,
@@ -338,8 +344,8 @@ def parse(args: Sequence[str] | None) -> argparse.Namespace:
         parser.error('--tap needs two different ports')
     if options.files and options.save:
         parser.error('--save is for --port and --tap')
-    if options.binary and not options.files:
-        parser.error('--binary is for files')
+    if (options.binary or options.tcp) and not options.files:
+        parser.error('--binary and --tcp are for files')
     if options.report and (not options.files or options.binary):
         parser.error('--report is for captures: record one with --save, or trace_file of the node')
     if not options.report and (options.settings or options.conformance):
@@ -377,7 +383,7 @@ def _decode_files(options: argparse.Namespace, output: Output) -> int:
     except Problem as problem:
         status = EXIT_USAGE
         _say(str(problem))
-        if not output.is_empty:
+        if not output.is_empty and not isinstance(problem, TextProblem):
             output.end()
     else:
         output.end()
@@ -389,9 +395,11 @@ def _take_files(options: argparse.Namespace, output: Output) -> None:
     end = time.monotonic() + options.seconds
     for name in options.files:
         has_bytes = False
-        for recording, chunk in _recorded(name, options.binary):
+        for recording, chunk in _recorded(name, options):
             if time.monotonic() >= end:
                 return
+            if recording.told and not has_bytes:
+                _say(f'{name}: {recording.told}')
             has_bytes = True
             if lost := recording.settings.pop(LOST, ''):
                 _say(f'{name}: the recorder has lost lines before {chunk.time} s: {lost}. '
@@ -404,10 +412,11 @@ def _take_files(options: argparse.Namespace, output: Output) -> None:
             _say(f'{name}: the file has no bytes')
 
 
-def _recorded(name: str, is_binary: bool) -> Iterator[tuple[Recording, Chunk]]:
+def _recorded(name: str, options: argparse.Namespace) -> Iterator[tuple[Recording, Chunk]]:
     """Yield the chunks of a file."""
+    servers = frozenset(options.tcp or DEVICE_SERVERS)
     try:
-        recording = Recording(Path(name), is_binary)
+        recording = Recording(Path(name), options.binary, servers)
         for chunk in recording.chunks():
             yield recording, chunk
     except OSError as error:

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Traffic in recorded packets: DF1 from ``sniff`` or an RTAC, and PCCC inside EtherNet/IP.
+Traffic in recorded packets: DF1 of ``sniff``, RTAC, device server or USB, and PCCC in EtherNet/IP.
 
 Inside EtherNet/IP (TCP port 44818), PCCC is the data of CIP service 4B (Execute PCCC) of the PCCC
 object (class 67). The service may be inside an Unconnected Send (52). There, PCCC has no frame,
@@ -34,6 +34,7 @@ from abdf1_ros.cip.requests import CipService, REPLY
 from abdf1_ros.sniffer.capture import Chunk, Direction
 from abdf1_ros.sniffer.packet_files import RecordedPacket
 from abdf1_ros.sniffer.pcapng import DIRECTIONS, HEAD_SIZE, LINK_TYPE, VERSION
+from abdf1_ros.sniffer.serial_packets import DeviceServers, USB_HEADS, UsbDevices
 
 # A serial port recorded by an RTAC of SEL (link type RTAC_SERIAL): 12 bytes before the data. The
 # ninth byte is the event; only the begin and the end of sending or receiving have data.
@@ -42,6 +43,8 @@ _RTAC_EVENTS = {1: Direction.OUT, 2: Direction.IN, 3: Direction.OUT, 4: Directio
 
 _DIRECTIONS = {number: way for way, number in DIRECTIONS.items()}
 
+# Data port of Moxa NPort (TCP server mode) and of Lantronix and Digi, for the first serial port.
+DEVICE_SERVERS = frozenset((4001, 2101))
 CSP = 2222  # PCCC of older Ethernet processors, in a format of its own
 # Number of bytes before an IPv4 header, and the position of its EtherType in them, by link type:
 # loopback, Ethernet, raw IP, Linux cooked 1 and 2.
@@ -191,8 +194,13 @@ def _opposite(ends: bytes) -> bytes:
 
 @dataclass(slots=True)
 class SeenPackets:
-    """The TCP ports of packets, and the sizes (bytes) of packets that the recorder has cut."""
+    """
+    The TCP ports of packets, and the sizes (bytes) of packets that the recorder has cut.
 
+    ``servers`` are the ports of device servers: what comes from and to them is DF1.
+    """
+
+    servers: frozenset[int] = DEVICE_SERVERS
     ports: set[int] = field(default_factory=set)
     cut: list[int] = field(default_factory=list)
 
@@ -201,9 +209,10 @@ def chunks_of(packets: Iterable[RecordedPacket], seen: SeenPackets) -> Iterator[
     """
     Yield the DF1 and PCCC of packets, with times (s) from the first packet on.
 
-    ``seen`` gets the TCP ports, and the sizes of packets that were cut and are not decoded.
+    ``seen`` gets the TCP ports, and the sizes of packets that were cut and are not decoded. Raises
+    ValueError if the bytes of the line cannot be found.
     """
-    connections = _Connections()
+    connections, servers, usb = _Connections(), DeviceServers(seen.servers), UsbDevices()
     begun: float | None = None
     later: float | None = None
     for time, link_type, data in packets:
@@ -213,14 +222,20 @@ def chunks_of(packets: Iterable[RecordedPacket], seen: SeenPackets) -> Iterator[
             yield Chunk(later, _DIRECTIONS.get(data[1], Direction.UNKNOWN), data[HEAD_SIZE:])
         elif link_type == _RTAC and len(data) > 12 and data[8] in _RTAC_EVENTS:
             yield Chunk(later, _RTAC_EVENTS[data[8]], data[12:])
+        elif link_type in USB_HEADS:
+            yield from usb.feed(data, USB_HEADS[link_type], later)
         elif (segment := _tcp(link_type, data)) is not None:
             ends, number, payload, is_first, is_cut = segment
             both = {int.from_bytes(ends[8:10], 'big'), int.from_bytes(ends[10:], 'big')}
             seen.ports |= both
-            if PORT in both and is_cut:
+            is_serial = bool(both & seen.servers)
+            if is_cut and (PORT in both or is_serial):
                 seen.cut.append(len(data))
             elif PORT in both:
                 yield from connections.feed(ends, number, payload, later, is_first=is_first)
+            elif is_serial:
+                yield from servers.feed(ends, number, payload, later, is_first=is_first)
+    yield from servers.flush(later)
     yield from connections.flush(later)
 
 

@@ -129,6 +129,31 @@ def test_bad_line_ends_with_file_and_line_and_the_summary_so_far(
         'as in 0.004210 < 10 04\n')
 
 
+def test_how_a_log_is_read_is_told_and_a_bad_line_ends_it_without_summary(
+        capsys: Output, tmp_path: Path) -> None:
+    path = tmp_path / 'log'
+    lines = [f'{"AB"[way == "<"]}: {data.hex()}' for way, data in zip(WAYS, SAID)]
+    path.write_text('\n'.join(lines), encoding='ascii')
+    assert main(['--summary', str(path)]) == 0
+    captured = capsys.readouterr()
+    assert captured.err == f'sniff: {path}: read as bytes in hexadecimal, at the end of a line; ' \
+                           '> is "A:"; < is "B:"\n'
+    assert captured.out.startswith('summary: 45 bytes (27 >, 18 <), half duplex, CRC')
+    path.write_text('\n'.join([*2000 * lines, 'A: 10 0']), encoding='ascii')
+    assert main(['--summary', str(path)]) == 2
+    captured = capsys.readouterr()
+    assert f'sniff: {path}:10001: "A: 10 0" does not fit: write bytes as in' in captured.err
+    assert captured.out == ''
+
+
+def test_port_of_a_device_server_is_an_option(capsys: Output) -> None:
+    path = str(Path(__file__).parents[1] / 'sniffer/forms/moxa_4001.pcap')
+    for options in ([], ['--tcp', '4001'], ['--tcp', '950', '--tcp', '4001']):
+        assert '  seen: 2 commands, 2 replies, 4 ACK' in lines_of(
+            capsys, '--summary', *options, path)
+    assert 'seen are TCP ports 4001, 50000: give that of' in refused(capsys, '--tcp', '950', path)
+
+
 @pytest.mark.parametrize('options, status, err, ends_with_summary', [
     ([], 2, 'sniff: /dev/zero:1: this is not text; for a file of raw bytes give --binary\n',
      False),
@@ -178,7 +203,7 @@ def test_file_that_cannot_be_read_is_an_error_without_an_empty_summary(
     assert captured.err.startswith(f'sniff: {none}: cannot be read: ')
 
 
-@pytest.mark.parametrize('text', ['', '# abdf1_ros capture 1\n# baud: 9600\n', '# a remark\n'])
+@pytest.mark.parametrize('text', ['', '# abdf1_ros capture 1\n# baud: 9600\n', ' \n'])
 def test_file_without_bytes_is_told(
         capsys: Output, tmp_path: Path, capture: str, text: str) -> None:
     path = tmp_path / 'empty'
@@ -252,6 +277,7 @@ def test_packets_go_nowhere_else_than_into_pcapng(
 @for_all('args', [
     [], ['x', '--port', 'y'], ['--port', 'x', '--tap', 'y', 'z'], ['x', '--binary', '--save', 'y'],
     ['--port', 'x', '--binary'], ['--tap', 'x'], ['--tap', 'x', 'x'],
+    ['--port', 'x', '--tcp', '950'], ['x', '--tcp', 'moxa'],
     ['--port', 'x', '--save', 'y', '--html', './y'],
     ['x', '--report', 'r', '--conformance', 'y', '--html', 'y'],
     ['x', '--check', 'md5'], ['x', '--baud', '7'], ['x', '--conformance', 'y'],

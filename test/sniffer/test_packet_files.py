@@ -325,6 +325,116 @@ def test_other_packets_are_passed_over(tmp_path: Path, packet: bytes) -> None:
     assert [chunk.is_message for chunk in found] == [True, True]
 
 
+POLL, EOT = bytes.fromhex('100501FF'), b'\x10\x04'
+
+
+def to_server(data: bytes, number: int, to_plc: bool = True, port: int = 4001, flags: int = 0x18,
+              net: int = 0, host: int = 65) -> bytes:
+    """Return a segment to a device server, or from it, in Ethernet."""
+    segment = tcp(data, number, to_plc, flags, net)
+    return ethernet(segment.replace((44818).to_bytes(2, 'big'), port.to_bytes(2, 'big')).replace(
+        bytes((192, 168, net, 30)), bytes((192, 168, net, host))))
+
+
+@for_all('port', [4001, 2101])
+def test_bytes_of_a_device_server_come_in_their_order(tmp_path: Path, port: int) -> None:
+    """One host may have both ends, as with a recording on 127.0.0.1: the port tells the server."""
+    parts = [(b'', -1, True, 0x02), (POLL[:2], 0, True, 0x18), (b'\xFF', 3, True, 0x18),
+             (POLL[1:3], 1, True, 0x18), (POLL[:2], 0, True, 0x18), (EOT, 7000, False, 0x18),
+             (b'', 4, True, 0x10), (EOT, 7000, False, 0x18), (b'', 99, True, 0x02),
+             (POLL, 100, True, 0x18)]
+    packets = [(100.0 + at, to_server(data, 0xFFFFFFFE + number, to_plc, port, flags))
+               for at, (data, number, to_plc, flags) in enumerate(parts)]
+    assert chunks_of(tmp_path / 'x', pcap(packets)) == [
+        Chunk(1.0, Direction.OUT, POLL[:2]), Chunk(3.0, Direction.OUT, POLL[2:]),
+        Chunk(5.0, Direction.IN, EOT), Chunk(9.0, Direction.OUT, POLL)]
+
+
+def test_bytes_that_were_not_recorded_do_not_hold_up_those_after_them(tmp_path: Path) -> None:
+    packets = [(0.0, to_server(POLL, 0)), *((float(at), to_server(POLL, 100 + 8 * at))
+                                            for at in range(1, 12))]
+    found = chunks_of(tmp_path / 'x', pcap(packets))
+    assert b''.join(chunk.data for chunk in found) == 12 * POLL
+    assert found[1].time == 9.0  # nobody waits for more than eight segments
+
+
+def test_port_of_a_device_server_is_given_or_asked_for(tmp_path: Path) -> None:
+    path = tmp_path / 'x'
+    path.write_bytes(pcap([(0.0, to_server(POLL, 0, port=950))]))
+    with pytest.raises(Problem, match='seen are TCP ports 950, 50000: give that of a device serv'):
+        list(Recording(path).chunks())
+    assert list(Recording(path, servers=frozenset((950,))).chunks()) == [
+        Chunk(0.0, Direction.OUT, POLL)]
+
+
+def test_two_device_servers_are_two_lines(tmp_path: Path) -> None:
+    for port, host, other in ((2101, 30, '192.168.0.30:2101'), (4001, 31, '192.168.0.31:4001')):
+        packets = [(0.0, to_server(POLL, 0, host=30)),
+                   (0.1, to_server(POLL, 0, port=port, host=host))]
+        with pytest.raises(Problem, match=f'byte .* 192.168.0.30:4001 and {other} are two lines'):
+            chunks_of(tmp_path / 'x', pcap(packets))
+    cut = to_server(POLL, 0)[:-10]
+    with pytest.raises(Problem, match='1 packet cut by the recorder'):
+        chunks_of(tmp_path / 'x', pcap([(0.0, cut)]))
+
+
+FTDI = bytes.fromhex('12 01 0002 00 00 00 08 0304 0160 0006 01 02 03 01')
+# A configuration whose end 81 has packets of 64 bytes.
+ENDS = bytes.fromhex('09 02 2000 01 01 00 A0 2D 09 04 00 00 02 FF FF FF 02 07 05 81 02 4000 00 '
+                     '07 05 02 02 4000 00')
+USB = 220
+
+
+def urb(event: str, end: int, data: bytes, transfer: int = 3, device: int = 5, setup: str = '',
+        head: int = 64, number: int = 1) -> bytes:
+    """Return a packet of usbmon, as Documentation/usb/usbmon.rst of Linux has it."""
+    return struct.pack('<QcBBBHBBqiiII8s', number, event.encode(), transfer, end, device, 1,
+                       0 if setup else 45, 0, 0, 0, 0, len(data), len(data),
+                       bytes.fromhex(setup)).ljust(head, b'\0') + data
+
+
+def described(descriptor: bytes, kind: int, device: int = 5) -> list[bytes]:
+    return [urb('S', 0x80, b'', 2, device, f'80 06 00 {kind:02x} 00 00 12 00', number=77),
+            urb('C', 0x80, descriptor, 2, device, number=77)]
+
+
+def recorded(path: Path, packets: Sequence[bytes], link_type: int = USB) -> list[Chunk]:
+    return chunks_of(path, pcap([*enumerate(packets)], link_type))
+
+
+def test_status_bytes_of_ftdi_are_taken_off_each_packet(tmp_path: Path) -> None:
+    said = bytes(range(100))
+    sent = b'\x01\x60' + said[:62] + b'\x01\x60' + said[62:]
+    for head, link_type in ((64, USB), (48, 189)):
+        talk = [urb('S', 2, POLL, head=head), urb('C', 2, b'', head=head),
+                urb('S', 0x81, b'', head=head), urb('C', 0x81, b'\x01\x60', head=head),
+                urb('C', 0x81, sent, head=head)]
+        heads = [packet[:48].ljust(head, b'\0') + packet[64:] for packet in (
+            *described(FTDI, 1), *described(ENDS, 2))]
+        assert [chunk[1:3] for chunk in recorded(tmp_path / 'x', [*heads, *talk], link_type)] == [
+            (Direction.OUT, POLL), (Direction.IN, said)]
+    fast = FTDI[:12] + b'\x00\x09' + FTDI[14:]  # an FT232H, with packets of 512 bytes
+    found = recorded(tmp_path / 'x', [*described(fast, 1), urb('C', 0x81, sent)])
+    assert [chunk.data for chunk in found] == [sent[2:]]
+
+
+def test_adapters_of_others_send_no_status_bytes(tmp_path: Path) -> None:
+    other = FTDI[:8] + b'\x86\x1A' + FTDI[10:]
+    packets = [*described(other, 1), urb('C', 0x81, EOT), urb('C', 0x83, b'\1', 1), b'short']
+    assert [chunk.data for chunk in recorded(tmp_path / 'x', packets)] == [EOT]
+
+
+@for_all(('packets', 'text'), [
+    ([urb('C', 0x81, EOT)], 'USB device 1.5: its descriptors are not in the recording'),
+    ([*described(FTDI, 1, 4), urb('S', 2, POLL)], 'begin the recording before you plug the ada'),
+    ([*described(FTDI, 1), urb('S', 2, POLL), *described(FTDI, 1, 6), urb('S', 2, POLL, device=6)],
+     'the USB devices 1.5 and 1.6 both have bulk data')])
+def test_usb_whose_bytes_are_not_known_is_refused(
+        tmp_path: Path, packets: list[bytes], text: str) -> None:
+    with pytest.raises(Problem, match=text):
+        recorded(tmp_path / 'x', packets)
+
+
 # Section: little endian, version 1.0, length not given. Interface: USER0, no limit, name "DF1".
 HEAD = bytes.fromhex(
     '0A0D0D0A 1C000000 4D3C2B1A 0100 0000 FFFFFFFFFFFFFFFF 1C000000'

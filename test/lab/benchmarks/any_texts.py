@@ -91,6 +91,13 @@ TEXTS: dict[str, tuple[Command, Text]] = {
     'log with gaps': (sniffed(), repeated(LOG, 'AA  ', 'zz')),
     'log with blanks': (sniffed(), repeated(LOG, '20  ', 'zz')),
     'log with backslashes': (sniffed(), repeated(f"{LOG}b'", '\\')),
+    'log with carets': (sniffed(), repeated('TX ', 'A^')),
+    'log with quotes': (sniffed(), repeated('TX ', "\\'")),
+    'log with marks': (sniffed(), rows('', lambda row: f'm{row}: 10 05 01 FF')),
+    'log in decimal': (sniffed(), repeated('TX ', '16 5 1 255 ')),
+    'table': (sniffed(), rows('Time,Way,Data', lambda row: f'{row / 1000:.3f},TX,10 05 01 FF')),
+    'dump with characters': (sniffed(), rows('', lambda row: (
+        f'{16 * row:08x}  {"10 05 01 FF " * 4} |{4 * "...."}|'))),
     'log': (sniffed(), repeated('', f'{LOG}10 02 01 05 0F 00 12 34 A2 02 07 89 00 00 10 03\n')),
     'dump of words': (sniffed(), rows(f'0000000{" 1234" * 8}', lambda row: (
         f'{16 * (row + 1):07x}{" 1234" * 8}'))),
