@@ -40,7 +40,7 @@ BURST = 4096 * _CHARACTER
 
 _PAUSE = 0.01  # s between two clients that come
 STUCK = 10.0
-"""After this time (s) in which a client has taken no byte it counts as gone."""
+"""After this time (s) without a byte taken, or with bytes left at each read, a client is gone."""
 
 
 class Talk(Protocol):
@@ -81,22 +81,29 @@ class _ClientEnd(Generic[_Talk]):
         self.talk = talk
         self.came_after = now
         self.rests_until = -math.inf
+        self.waits_for = select.POLLIN
         self._line_until = now
-        self._stuck_since = math.inf
+        self._stuck_since = self._full_since = math.inf
 
-    @property
-    def events(self) -> int:
-        """Return what to wait for."""
-        return select.POLLOUT if self.talk.outgoing else select.POLLIN
+    def look_ahead(self, now: float) -> int:
+        """Return what to wait for: room for bytes, bytes, or its end while it rests."""
+        self.waits_for = select.POLLOUT if self.talk.outgoing else \
+            select.POLLIN if now >= self.rests_until else select.POLLRDHUP
+        return self.waits_for
 
     def read(self, now: float) -> bytes:
-        """Return bytes; raise OSError when the client has gone."""
+        """Return bytes; raise OSError when the client has gone, also with bytes left to read."""
+        if self.waits_for == select.POLLRDHUP:
+            raise OSError('the client has left while it had to rest')
         try:
             data = self.connection.recv(READ_SIZE)
         except BlockingIOError:
             return b''
         if not data:
             raise OSError('the client has closed the connection')
+        self._full_since = min(self._full_since, now) if len(data) == READ_SIZE else math.inf
+        if now - self._full_since > STUCK:  # it may have left long ago
+            raise OSError('the client sends without end')
         self._line_until = max(self._line_until, now) + len(data) * _CHARACTER
         self.rests_until = self._line_until - BURST
         return data
@@ -131,19 +138,18 @@ class ClientsPort(Generic[_Talk]):
         poll.register(wake, select.POLLIN)
         if asked >= self._rests_until:
             poll.register(self._listener, select.POLLIN)
-        awake = {number: client for number, client in self._clients.items()
-                 if client.talk.outgoing or asked >= client.rests_until}
-        for number, client in awake.items():
-            poll.register(number, client.events)
+        for number, client in self._clients.items():
+            poll.register(number, client.look_ahead(asked))
         ends = [end - asked for end in (self._rests_until, *(
             client.rests_until for client in self._clients.values())) if end > asked]
         events = dict(poll.poll(math.ceil(min([GLANCE, *ends]) * 1000)))
-        now = clock()
-        for number, client in awake.items():
-            if client.events & select.POLLIN and number not in events:
+        now, ready = clock(), []
+        for number, client in self._clients.items():
+            if number in events and client.waits_for != select.POLLOUT:
+                ready.append(client)
+            elif client.waits_for == select.POLLIN:
                 client.came_after = now
-        return ([awake[number] for number in events if number in awake
-                 and awake[number].events & select.POLLIN], self._listener.fileno() in events)
+        return ready, self._listener.fileno() in events
 
     def accept(self, now: float) -> tuple[socket.socket, str, tuple[str, int]] | None:
         """Return a client that has come, its address, and where it has reached us."""

@@ -155,3 +155,28 @@ def test_port_is_closed_while_it_is_released() -> None:
             assert not server.thread.state.is_open
         server.thread.take()
         wait_for(lambda: server.thread.state.is_open)
+
+
+def test_client_that_leaves_while_it_rests_is_gone_at_once() -> None:
+    with echo(2) as (server, (flood, calm)):
+        flood.sendall(bytes(200_000))
+        wait_for(lambda: len(server.talks[0].heard) >= 4096)
+        flood.close()
+        wait_for(lambda: server.left == [server.talks[0]])
+        assert len(server.talks[0].heard) <= 4096 + 512
+        calm.sendall(b'x')
+        assert calm.recv(10) == b'x'
+
+
+def test_client_that_sends_without_end_is_closed_after_10_s() -> None:
+    with echo(2) as (server, (flood, calm)):
+        flood.sendall(bytes(200_000))
+        begun, heard = server.now, 0
+        while not server.left:
+            wait_for(lambda: server.left or len(server.talks[0].heard) > heard)  # noqa: B023
+            heard = len(server.talks[0].heard)
+            server.now += 1.0
+            calm.sendall(b'x')
+            assert calm.recv(10) == b'x'
+        assert server.left == [server.talks[0]]
+        assert 10.0 < server.now - begun < 15.0
