@@ -20,6 +20,7 @@ import argparse
 from collections.abc import Iterator, Sequence
 from datetime import datetime
 from functools import partial
+import sys
 
 from abdf1_ros.cli.plc.asking import ask, mappings_of
 from abdf1_ros.cli.plc.data import tag_of, Tags
@@ -38,14 +39,14 @@ from abdf1_ros.cli.plc.reading import NoValue, RepeatedReads, WatchedRead
 from abdf1_ros.cli.plc.session import complain, Session
 from abdf1_ros.cli.plc.targets import Targets
 from abdf1_ros.cli.plc.watch import lost_reads
-from abdf1_ros.cli.terminal import EXIT_FAILED
+from abdf1_ros.cli.terminal import EXIT_FAILED, is_terminal, Progress
 from abdf1_ros.pccc.values import Values, ValueType
 from abdf1_ros.plan.usable_rows import usable_rows
 from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.rows import Rows
-from abdf1_ros.text import printable, value_text
+from abdf1_ros.text import counted, printable, value_text
 
 # Without a reason a row is this late (s, and periods) only if the host or the program stood still.
 _STOOD_STILL = 5.0
@@ -55,13 +56,14 @@ class ValueLog(RepeatedReads):
     """
     Write each read to ``output``, a row for each value, and the reason of each gap.
 
-    Raises LogLost if the log cannot be written.
+    A terminal shows the progress of a file. Raises LogLost if the log cannot be written.
     """
 
     def __init__(self, network: Network, mappings: Sequence[Mapping], period: float,
                  output: LogFile | LogOutput, tags: Tags | None = None,
                  record: str | None = None) -> None:
         self._output = output
+        self._progress = Progress() if is_terminal(sys.stderr) else None
         self._heads = {mapping: [*_heads(mapping, tags)] for mapping in mappings}
         self._gaps: dict[Mapping, datetime] = {}
         self._latest: dict[Mapping, datetime] = {}
@@ -69,6 +71,14 @@ class ValueLog(RepeatedReads):
         self._again = HEARD_AGAIN if self._is_listening else ANSWERS_AGAIN
         self._patience = {point.mapping: max(_STOOD_STILL, _STOOD_STILL * point.period)
                           for point in self._points}
+
+    def run(self, count: int | None) -> int:
+        """Log; see ``RepeatedReads``."""
+        try:
+            return super().run(count)
+        finally:
+            if self._progress:
+                self._progress.clear()
 
     def begin(self) -> None:
         """Write what stands before the first row."""
@@ -80,6 +90,11 @@ class ValueLog(RepeatedReads):
         if lost:
             rows.insert(0, LogRow(news[0].when, None, '', '', Cell.NONE, '', lost_reads(lost)))
         self._output.write(rows)
+        if self._progress and isinstance(self._output, LogFile):
+            missing = f', {len(self._gaps)} of {len(self._heads)} addresses without a value' \
+                if self._gaps else ''
+            self._progress.show(f'{self._output.path}: '
+                                f'{counted(self._output.count, "row")}{missing}; Ctrl-C ends')
 
     def _rows(self, read: WatchedRead) -> Iterator[LogRow]:
         when, mapping, what = read

@@ -172,7 +172,7 @@ class LogOutput:
 
     def __init__(self, form: LogForm) -> None:
         self._form = form
-        self._count = 0
+        self.count = 0
         self._is_continued = _is_our_output(form)
 
     def begin(self) -> None:
@@ -186,7 +186,7 @@ class LogOutput:
         """Write rows; raises LogLost, and BrokenPipeError if the reader has left."""
         if lines := [*map(self._form.line, rows)]:
             self._put('\n'.join(lines))
-            self._count += len(lines)
+            self.count += len(lines)
 
     def _put(self, text: str) -> None:
         try:
@@ -195,7 +195,7 @@ class LogOutput:
             raise
         except OSError as error:
             drop_output()
-            raise LogLost(_lost('the output', error, self._count)) from None
+            raise LogLost(_lost('the output', error, self.count)) from None
 
     def close(self) -> None:
         """Do nothing: the output stays open."""
@@ -227,15 +227,15 @@ class LogFile:
     """
     A log on the disk that is continued, row by row.
 
-    It never has half a row: the rest of one, after a power failure, is removed, and ``remark``
-    says so. Raises ConfigurationError if the file is not a log of this form, if another program
-    writes to it, or if it cannot be opened.
+    ``count`` is the number of rows of this run. The file never has half a row: the rest of one,
+    after a power failure, is removed, and ``remark`` says so. Raises ConfigurationError if the
+    file is not a log of this form, if another program writes to it, or if it cannot be opened.
     """
 
     def __init__(self, path: str, form: LogForm) -> None:
-        self._path = path
+        self.path = path
         self._form = form
-        self._count = self._size = 0
+        self.count = self._size = 0
         self.remark = ''
         self._is_new = not os.path.exists(path)
         try:
@@ -279,12 +279,12 @@ class LogFile:
         if len(rest) > self._size - start - 1:
             raise self._fault('has no line end in its last 64 kB')
         if rest:
-            self.remark = (f'{self._path}: removed the rest of a row that was not written to its '
+            self.remark = (f'{self.path}: removed the rest of a row that was not written to its '
                            f'end: "{shown(rest.decode("utf-8", "replace"))}"')
         return self._size - len(rest)
 
     def _fault(self, text: str) -> ConfigurationError:
-        return ConfigurationError([Problem('--to', f'{self._path} {text}; give another name')])
+        return ConfigurationError([Problem('--to', f'{self.path} {text}; give another name')])
 
     def begin(self) -> None:
         """Write what stands before the first row of this run."""
@@ -297,7 +297,7 @@ class LogFile:
         """Write rows; raises LogLost."""
         if lines := [*map(self._form.line, rows)]:
             self._put('\n'.join(lines))
-            self._count += len(lines)
+            self.count += len(lines)
 
     def _put(self, text: str) -> None:
         left = data = f'{text}\n'.encode()
@@ -307,7 +307,7 @@ class LogFile:
         except OSError as error:
             if self._is_regular:
                 os.ftruncate(self._file, self._size)  # half a row would mean another value
-            raise LogLost(_lost(self._path, error, self._count)) from None
+            raise LogLost(_lost(self.path, error, self.count)) from None
         self._size += len(data)
 
     def close(self) -> None:
@@ -315,4 +315,4 @@ class LogFile:
         os.close(self._file)
         if self._is_new and not self._size:
             with suppress(OSError):
-                os.unlink(self._path)
+                os.unlink(self.path)

@@ -27,6 +27,7 @@ import select
 import signal
 import subprocess
 import sys
+from unittest.mock import Mock
 
 from abdf1_ros.cli.plc.command import main
 from abdf1_ros.cli.plc.data import mapping_of
@@ -307,6 +308,21 @@ def test_log_goes_to_a_file_and_to_the_output(plc: Plc, tmp_path: Path) -> None:
         2, '', 'plc: --radix: is for a table; --csv has decimal numbers\n')
     row = json.loads(plc('log', 'N7:0', '--count', '1', '--format', 'jsonl').lines[0])
     assert (row['address'], row['value'], row['reason']) == ('N7:0', 1200, '')
+
+
+def test_terminal_shows_the_progress_of_a_file(
+        plc: Plc, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    progress = Mock()
+    monkeypatch.setattr('abdf1_ros.cli.plc.log.is_terminal', lambda stream: True)
+    monkeypatch.setattr('abdf1_ros.cli.plc.log.Progress', lambda: progress)
+    path = tmp_path / 'shift.csv'
+    plc('log', 'N7:0-1', 'N99:0', '--count', '1', '--to', str(path))
+    assert progress.show.call_args.args[0].endswith(
+        ' rows, 1 of 2 addresses without a value; Ctrl-C ends')
+    progress.clear.assert_called_once_with()
+    progress.show.reset_mock()
+    assert plc('log', 'N7:0', '--count', '1').status == 0
+    assert not progress.show.called  # beside the rows
 
 
 def test_log_ends_with_one_line_and_status_1_when_the_disk_is_full(plc: Plc) -> None:
