@@ -82,7 +82,10 @@ def refusal(folder: Path, text: str | bytes, wanted: Wanted | None = None,
     ('Min,Max', '-5,1500', {'Min': '-5', 'Max': '1500'}, ''),
     ('Length', '20', {'Length': '20', 'Command': 'ReadWrite'}, ''),
     ('Length', '16', {'Length': '1', 'Command': 'Read'},
-     'Length 16 may count bits or bytes of one value: not used, made Read rows'),
+     'Length 16 may be the size of one value in bits, bytes or words: not used, made Read rows'),
+    ('Type,Word Order,Length', 'DINT,Low,2', {'Length': '1', 'Command': 'Read'},
+     'Length 2 may be the size of one value in bits, bytes or words: not used, made Read rows'),
+    ('Type,Word Order,Length', 'DINT,Low,3', {'Length': '3', 'Command': 'ReadWrite'}, ''),
     ('Length', '0', {'Length': '1', 'Command': 'ReadWrite'}, ''),
     ('Invert', 'no', {'Command': 'ReadWrite'}, ''),
     ('Converter', 'x10', {'Command': 'Read'}, f'column "Converter"{STRANGE}'),
@@ -151,7 +154,10 @@ def test_rows_of_two_plcs_do_not_go_to_one(tmp_path: Path, name: str) -> None:
     text = PLCS.format(name).replace('\nPLC', '\n,PLC' if ',' in name else '\nPLC')
     assert refusal(tmp_path, text) == (
         ': has rows of several PLCs: PLC1, PLC2; choose one with --plc NAME, or give the station '
-        'of each with --station-of NAME=N,NAME=N')
+        'of each with --station-of NAME=N,NAME=N; if a column of a list names no PLCs: --ignore '
+        'COLUMN')
+    many = 'Line,Tag,Address\n' + ''.join(f'{row},Run{row},B3:0/{row}\n' for row in range(9))
+    assert ': 0, 1, 2, 3, 4 and 4 more; choose' in refusal(tmp_path, many)
     assert 'has rows of several PLCs' in refusal(tmp_path, text, Wanted(stations=(1, 2)))
     made(tmp_path, text, Wanted(node='PLC2', stations=(7,)))
     assert cells(tmp_path, 'Tag', 'Station') == [('Run2', '7')]
@@ -460,6 +466,15 @@ def test_columns_that_people_add_to_an_export_count(
 def test_columns_of_short_rows_are_compared_as_they_stand(tmp_path: Path) -> None:
     text = 'Tag,Address,Access,Channel,Device\na,N7:0,RW,1,A\nb\nc,N7:0,RW,1,B\n'
     assert 'several PLCs: A, B;' in refusal(tmp_path, text)
+
+
+def test_family_that_could_have_the_addresses_is_named(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source = tmp_path / 'list.csv'
+    source.write_text('Tag,Address\nTotal,020\nDone,110/17\n', encoding='utf-8')
+    assert main(['import', str(source), '--into', str(tmp_path)]) == 1
+    assert capsys.readouterr().err.splitlines()[-1].endswith(
+        'no row can be used, 2 left out; nothing was written; --plc-type PLC2 can use 2 rows')
 
 
 def test_input_of_a_list_without_its_word_is_only_read(tmp_path: Path) -> None:

@@ -295,9 +295,10 @@ def _cells(form: Form, entry: ListRow, place: tuple[str, str], wanted: Wanted,
         command, remarks[:] = READ, []
     unclear = [*entry.unclear, *_unclear_parts(form, entry, (address, length, kind), wanted)]
     words = _words(address, kind, wanted)
-    if form.is_open and entry[Role.LENGTH] and whole_number(length) in (2 * words, 16 * words):
-        unclear.append(f'Length {length} may count bits or bytes of one value: not used, made '
-                       'Read rows')
+    if form.is_open and entry[Role.LENGTH] and words and whole_number(length) in (
+            words, 2 * words, 16 * words):
+        unclear.append(f'Length {length} may be the size of one value in bits, bytes or words: '
+                       'not used, made Read rows')
         length = ''
     elif form.is_open and length and _is_string(address, wanted):
         remarks.append('Length of a string in an ST file is not used')

@@ -35,7 +35,7 @@ from abdf1_ros.settings.map_file import MOST_ROWS
 from abdf1_ros.settings.map_row import RowReader
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.names import sanitise
-from abdf1_ros.text import is_head_of_values, printable, shown
+from abdf1_ros.text import first, is_head_of_values, printable, shown
 
 _LONGEST_HEAD = 200  # characters
 _COLUMNS = (*NEEDED, 'Length', 'Type', 'Period', 'Scale', 'Offset', 'Min', 'Max', 'Description')
@@ -78,7 +78,8 @@ def import_map(path: str, wanted: Wanted) -> Import:
     table = table_of(sheet, wanted)
     rows = [(record, entry if isinstance(entry, Ignored) else read_row(
         table.form, entry, wanted)) for record, entry in table.rows]
-    stations = _stations(path, [row for _, row in rows if isinstance(row, FoundRow)], wanted)
+    stations = _stations(path, [row for _, row in rows if isinstance(row, FoundRow)],
+                         table.form.is_open, wanted)
     result, seen = Import(), dict[str, int]()
     if any(isinstance(row, FoundRow) and 'Word_Order' in row.cells for _, row in rows):
         result.columns = (*_COLUMNS, 'Word_Order')
@@ -113,7 +114,7 @@ _Heads = dict[str, str]
 """The text before the tags of a row, by its station."""
 
 
-def _stations(path: str, rows: Sequence[FoundRow],
+def _stations(path: str, rows: Sequence[FoundRow], is_open: bool,
               wanted: Wanted) -> Callable[[FoundRow], _Heads | None]:
     """
     Return the function that gives the stations of a row, None for a row that is not wanted.
@@ -123,7 +124,7 @@ def _stations(path: str, rows: Sequence[FoundRow],
     good = [row for row in rows if not row.fault and _checked(path, 1, {
         **row.cells, 'Station': '1', 'PLC_Type': wanted.plc_type.value})[0]]
     names = dict.fromkeys(_name(row) for row in good)
-    listed = ', '.join(shown(name) or '""' for name in names)
+    listed = first([shown(name) or '""' for name in names])
     for name in wanted.station_of or ([] if wanted.node is None else [wanted.node]):
         if name not in names:
             raise ConfigurationError([Problem(path, f'has no PLC "{shown(name)}"; it has '
@@ -138,7 +139,8 @@ def _stations(path: str, rows: Sequence[FoundRow],
     if not wanted.station_of and len(plcs) > len({station for station, _ in plcs}):
         raise ConfigurationError([Problem(path, (
             f'has rows of several PLCs: {listed}; choose one with --plc NAME, or give the station '
-            'of each with --station-of NAME=N,NAME=N'))])
+            'of each with --station-of NAME=N,NAME=N'
+            + '; if a column of a list names no PLCs: --ignore COLUMN' * is_open))])
     heads = _heads_of(good, wanted)
 
     def of(row: FoundRow) -> _Heads | None:

@@ -23,6 +23,7 @@ from __future__ import annotations
 
 import argparse
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 import shlex
 
@@ -36,6 +37,7 @@ from abdf1_ros.df1.stations import MAX_STATION
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.numbers import whole_number
 from abdf1_ros.paths import expanded
+from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.plan.report import make_report
 from abdf1_ros.problems import ConfigurationError
@@ -95,16 +97,26 @@ def _stations_by_name(text: str) -> dict[str, int]:
     return found
 
 
+def _other_family(path: str, wanted: Wanted) -> str:
+    """Return the family that can use rows of a file, empty for none."""
+    for kind in FAMILIES:
+        with suppress(ConfigurationError):
+            if count := import_map(path, replace(wanted, plc_type=kind)).count:
+                return f'; --plc-type {kind.value} can use {counted(count, "row")}'
+    return ''
+
+
 def run(options: argparse.Namespace) -> int:
     """Make map.csv of an export; print the rows that are left out."""
     if options.station_of and (options.stations or options.plc is not None):
         complain('--station-of gives the station of each PLC: not together with --station or '
                  '--plc')
         return EXIT_USAGE
-    result = import_map(options.file, Wanted(
+    wanted = Wanted(
         PlcType(options.plc_type), options.stations, options.read_only, options.period,
         {role: name for role in _COLUMN_ROLES if (name := getattr(options, f'{role}_column'))},
-        options.plc, options.status, options.station_of, options.ignore))
+        options.plc, options.status, options.station_of, options.ignore)
+    result = import_map(options.file, wanted)
     for note in result.notes:
         complain(f'{options.file}: {note}')
     for problem in result.left_out:
@@ -115,7 +127,8 @@ def run(options: argparse.Namespace) -> int:
         complain(f'{counted(count, "row")}: {text}')
     left_out = f', {len(result.left_out)} left out' if result.left_out else ''
     if not result.count:
-        complain(f'{options.file}: no row can be used{left_out}; nothing was written')
+        complain(f'{options.file}: no row can be used{left_out}; nothing was written'
+                 f'{_other_family(options.file, wanted)}')
         return EXIT_FAILED
     file = init.NewFiles(Path(options.into), 'map.csv')
     file.write(result.text)
