@@ -184,7 +184,7 @@ class Agenda:
 
     def _own_first(self, now: float, busy: Container[int]) -> Job | None:
         """Return the next job: own writes first, not counted as ``writes`` in a row (rule 11)."""
-        if self._interlocks.is_ending:  # no read has a turn now (rule 5)
+        if self._interlocks.end.is_asked:  # no read has a turn now (rule 5)
             self._own_in_a_row, self._was_vain = 0, False
         if self._own_in_a_row >= OWN_IN_A_ROW and not self._interlocks.is_beats_turn(now):
             if busy and self._last_read is not None and self._last_read not in busy:
@@ -227,13 +227,13 @@ class Agenda:
             return write
         guests = self._guests
         # At the end a guest could overwrite a fallback that is confirmed already.
-        has_guests = (guests.inbox.items or guests.waiting) and not self._interlocks.is_ending
+        has_guests = (guests.inbox.items or guests.waiting) and not self._interlocks.end.is_asked
         is_held = has_guests and now < self._share.begins
         self._held_until = self._share.begins if is_held else math.inf
         has_guests = has_guests and not is_held
         if has_guests and self._share.is_turn and (guest := self._guest(now, busy)):
             return guest
-        if self._has_own and self._interlocks.keeps_line:
+        if self._has_own and self._interlocks.end.keeps_line:
             self._is_reads_turn = False
             return self._refresh(now, busy) or has_writes and self._write(now, busy) or None
         if self._stations.probes.died_at > -math.inf and (late := self._after_death(now, busy)):
@@ -353,7 +353,7 @@ class Agenda:
 
     def next_due(self) -> float:
         """Return when the next job is due (clock value in s), infinite for never."""
-        if self._has_own and self._interlocks.keeps_line:
+        if self._has_own and self._interlocks.end.keeps_line:
             return self._interlocks.next_due()
         due = min(self._reads.next_due(), self._checks.next_due, self._held_until)
         if not self._tasks.is_heard and self._questions >= _QUICK_QUESTIONS:

@@ -224,7 +224,7 @@ class Driver:
         return WriteReasons(
             read_only='this node is read_only' if self._settings.read_only else '',
             closed='' if self.is_online else _NOT_OPEN,
-            ends=ENDS if self.interlocks.is_ending else '',
+            ends=ENDS if self.interlocks.end.is_asked else '',
             crowded=TOO_MANY if len(self._inbox) + count > MAX_WAITING_WRITES else '')
 
     def _reasons_in_turn(self, write: Write, now: float) -> WriteReasons:
@@ -246,7 +246,7 @@ class Driver:
         """
         if self.overheard is not None:
             answer(ReadAnswer(error=f'Mode {self.network.mode}: nothing is sent'))
-        elif self.interlocks.is_ending:
+        elif self.interlocks.end.is_asked:
             answer(ReadAnswer(error=ENDS))
         elif not self._demands.inbox.put(ReadCall(mapping, answer)):
             answer(ReadAnswer(error=_NOT_OPEN))

@@ -81,7 +81,7 @@ def test_rules_5_and_8_port_given_away_and_taken_ten_times_has_its_fallback_each
     for _ in range(10):
         interlocks.end(cell)
         store(cell.plc, 'N7:0', [OLD])  # as the program that has the port does
-        cell.bench.driver.interlocks.resume()
+        cell.bench.driver.interlocks.end.resume()
         cell.bench.open(run=0.3)
         assert cell.word('N7:0') == 7
         cell.bench.write(speed, [3], run=0.1)
@@ -171,7 +171,7 @@ def test_bridge_that_only_listens_sends_nothing_whatever_its_rows_ask_for() -> N
         bench.driver.write([speed], [number], bench.now)
         bench.driver.interlocks.contact(1, bench.now)
         bench.run(0.5)
-    bench.driver.interlocks.wind_down()
+    bench.driver.interlocks.end.wind_down()
     bench.run(5.0)
     assert Outcome.WRITTEN not in bench.listener.outcomes()
 

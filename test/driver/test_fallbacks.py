@@ -370,7 +370,7 @@ def test_rule_2_message_before_the_last_fallback_makes_no_row_fresh() -> None:
     cell.publish(speed, 42, run=0.5)
     end(cell)
     store(cell.plc, 'N7:0', [1234])  # by another program, while the port is released
-    cell.bench.driver.interlocks.resume()
+    cell.bench.driver.interlocks.end.resume()
     since = cell.now
     cell.bench.open(run=1.0)
     assert cell.word('N7:0') == 7
@@ -900,7 +900,7 @@ def test_rule_12_fallback_of_a_serve_row_goes_into_our_own_table(ours: int, thei
     cell.bench.driver.interlocks.forget_served()
     assert words(served) + words(plain) + words(other) == b'\7\0\0\0\x08\0'
     cell.publish(other, 3, run=0.01)
-    cell.bench.driver.interlocks.wind_down()
+    cell.bench.driver.interlocks.end.wind_down()
     cell.bench.line.wake(cell.bench.driver.machine)
     assert words(other) == b'\x08\0'  # at the end at once
 
@@ -921,4 +921,4 @@ def test_rule_17_fallback_has_one_result_and_its_retries_have_none() -> None:
 def test_rule_18_read_only_writes_nothing() -> None:
     cell = Cell(beat_row(), speed_row(), read_only=True, run=3.0)
     assert cell.writes == cell.bench.driver.readings.blocks == []
-    assert cell.bench.driver.interlocks.is_over
+    assert cell.bench.driver.interlocks.end.is_over

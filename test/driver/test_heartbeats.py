@@ -117,7 +117,7 @@ def test_rule_3b_no_beat_while_a_fallback_is_not_confirmed() -> None:
     cell.run(2.0)
     assert cell.word('N7:0') == 7
     assert cell.word('N10:0') > 1
-    assert cell.bench.driver.interlocks.unconfirmed(cell.now)[1:] == [elsewhere.tag]
+    assert cell.bench.driver.interlocks.end.unconfirmed(cell.now)[1:] == [elsewhere.tag]
 
 
 @pytest.mark.parametrize('polling', POLLING_MODES)

@@ -64,11 +64,11 @@ def test_end_writes_once_to_a_plc_that_is_not_heard(
         mode: str, dies_after: float, is_behind: bool) -> None:
     death = with_broken_wire(mode, dies_after, is_behind=is_behind)
     interlocks = death.driver.interlocks
-    interlocks.wind_down()
+    interlocks.end.wind_down()
     death.line.wake(death.driver.machine)
-    death.run_until(lambda: interlocks.is_over or death.clock() > dies_after + 6.0)
+    death.run_until(lambda: interlocks.end.is_over or death.clock() > dies_after + 6.0)
     assert (death.word(7), death.word(10)) == (SAFE, 0)
-    assert sorted(interlocks.unconfirmed(0.0)) == ['beat', 'speed']
+    assert sorted(interlocks.end.unconfirmed(0.0)) == ['beat', 'speed']
 
 
 def test_0_and_fallback_go_out_without_a_poll_once_and_a_read_after_one() -> None:

@@ -51,14 +51,14 @@ def test_rule_5_orderly_end_is_0_then_the_fallbacks() -> None:
     cell.publish(speed, 3, times=20, run=1.95)
     since = cell.now
     driver = cell.bench.driver
-    assert not driver.interlocks.is_over
-    driver.interlocks.wind_down()
+    assert not driver.interlocks.end.is_over
+    driver.interlocks.end.wind_down()
     cell.bench.line.wake(driver.machine)
     cell.bench.write(speed, [4], run=0.3)
     assert [(name, value) for when, name, value in cell.writes if when >= since] == [
         ('N10:0', 0), ('N7:0', 7)]
-    assert driver.interlocks.is_over
-    assert driver.interlocks.unconfirmed(cell.now) == []
+    assert driver.interlocks.end.is_over
+    assert driver.interlocks.end.unconfirmed(cell.now) == []
     assert cell.results()[-2:] == ['not written: refused: this node ends', END]
 
 
@@ -86,7 +86,7 @@ def test_rule_5_message_does_not_outlive_the_end(moment: str) -> None:
         assert cell.word('N7:0') == 7
     end(cell, 0.3)
     assert (cell.word('N10:0'), cell.word('N7:0')) == (0, 7)
-    assert driver.interlocks.unconfirmed(cell.now) == []
+    assert driver.interlocks.end.unconfirmed(cell.now) == []
 
 
 @pytest.mark.parametrize('event', ['end', 'RUN', 'port'])
@@ -165,7 +165,7 @@ def test_rule_5_end_asks_a_silent_plc_at_once_where_another_answers() -> None:
     cell.publish(speed, 42, times=20, run=1.95)
     cell.plc.faults.silent = True
     cell.bench.at(cell.now + 1.0, lambda: setattr(cell.plc.faults, 'silent', False))
-    cell.bench.driver.interlocks.wind_down()
+    cell.bench.driver.interlocks.end.wind_down()
     cell.bench.line.wake(cell.bench.driver.machine)
     cell.run(1.5)
     assert (cell.word('N10:0'), cell.word('N7:0')) == (0, 7)
@@ -180,10 +180,10 @@ def test_rule_5_end_asks_a_silent_plc_too_where_another_has_its_own_rows() -> No
         line.write(row, [3], run=0.1)
     line.far_stations[0].faults.silent = True
     line.run(1.0)
-    line.driver.interlocks.wind_down()
+    line.driver.interlocks.end.wind_down()
     line.line.wake(line.driver.machine)
-    line.run_until(lambda: line.driver.interlocks.is_over, 2.0)
-    assert line.driver.interlocks.unconfirmed(line.clock()) == ['speed1']
+    line.run_until(lambda: line.driver.interlocks.end.is_over, 2.0)
+    assert line.driver.interlocks.end.unconfirmed(line.clock()) == ['speed1']
 
 
 @pytest.mark.parametrize(('ends', 'is_silent', 'answer_within'), [
@@ -196,7 +196,7 @@ def test_rule_5_last_try_at_a_silent_plc_is_short(
         driver.stations.lost(1, 0.0)
     assert driver.interlocks.is_put_off(Write(driver.mappings[0], [3], 0.0)) is is_silent
     if ends:
-        driver.interlocks.wind_down()
+        driver.interlocks.end.wind_down()
     job = driver.interlocks.next(0.0)
     assert job is not None and (job.is_free, job.answer_within) == (True, answer_within)
 
@@ -206,27 +206,27 @@ def test_rule_5_silent_plc_is_not_due_at_the_end_while_another_has_not_answered(
     driver = Cell(*rows, start=False).bench.driver
     driver.interlocks.begin(0.0)
     driver.stations.lost(2, 0.0)
-    driver.interlocks.wind_down()
+    driver.interlocks.end.wind_down()
     assert [job and job.station for job in map(driver.interlocks.next, (0.0, 0.0))] == [1, None]
     assert driver.interlocks.next_due() == math.inf
 
 
 def test_rule_5_what_was_not_confirmed_at_the_end_is_named() -> None:
     cell = Cell(beat_row(), speed_row(), start=False)
-    assert cell.bench.driver.interlocks.unconfirmed(cell.now) == ['beat', 'speed']
+    assert cell.bench.driver.interlocks.end.unconfirmed(cell.now) == ['beat', 'speed']
     cell.bench.open(run=1.0)
     cell.refused = {'N10:0'}
-    cell.bench.driver.interlocks.wind_down()
+    cell.bench.driver.interlocks.end.wind_down()
     cell.bench.line.wake(cell.bench.driver.machine)
     cell.run(2.0)
-    assert not cell.bench.driver.interlocks.is_over
-    assert cell.bench.driver.interlocks.unconfirmed(cell.now) == ['beat']
+    assert not cell.bench.driver.interlocks.end.is_over
+    assert cell.bench.driver.interlocks.end.unconfirmed(cell.now) == ['beat']
 
 
 def begin_end(cell: Cell) -> Interlocks:
     """Begin an orderly end."""
     driver = cell.bench.driver
-    driver.interlocks.wind_down()
+    driver.interlocks.end.wind_down()
     cell.bench.line.wake(driver.machine)
     return driver.interlocks
 
@@ -246,46 +246,46 @@ def test_rule_5_end_waits_for_a_lost_port_and_writes_what_it_can_when_it_is_back
         cell.bench.run_until(lambda: any(row.is_under_way for row in interlocks.fallbacks))
         cell.bench.lose_port()
     tags = ['beat', 'speed'] if is_lost_first and beats else ['speed']
-    assert interlocks.unconfirmed(cell.now) == tags
-    assert interlocks.has_to_wait(is_open=False)
+    assert interlocks.end.unconfirmed(cell.now) == tags
+    assert interlocks.end.has_to_wait(is_open=False)
     cell.run(1.0)
     store(cell.plc, 'N10:5', [99])  # another program has the adapter for a moment
     cell.bench.open()
     since = cell.now
-    while interlocks.has_to_wait(is_open=True):
+    while interlocks.end.has_to_wait(is_open=True):
         assert cell.now < since + 1.0
         cell.run(0.005)
     assert (cell.word('N10:0'), cell.word('N7:0'), cell.word('N10:5')) == (0, 7, 7)
-    assert (interlocks.unconfirmed(cell.now), interlocks.not_repeated()) == ([], [])
-    assert not interlocks.has_to_wait(is_open=False)
+    assert (interlocks.end.unconfirmed(cell.now), interlocks.end.not_repeated()) == ([], [])
+    assert not interlocks.end.has_to_wait(is_open=False)
 
 
 def test_rule_5_end_does_not_wait_for_a_lost_port_where_no_command_of_ours_may_stand() -> None:
     speed, other = speed_row(Fallback((7,), 20_000)), speed_row(tag='other', address='N10:5')
     cell = Cell(speed, other, start=False)
     interlocks = cell.bench.driver.interlocks
-    interlocks.wind_down()
-    assert interlocks.unconfirmed(0.0) == ['speed', 'other']
-    assert not interlocks.has_to_wait(is_open=False)  # nothing has gone out
-    interlocks.resume()
+    interlocks.end.wind_down()
+    assert interlocks.end.unconfirmed(0.0) == ['speed', 'other']
+    assert not interlocks.end.has_to_wait(is_open=False)  # nothing has gone out
+    interlocks.end.resume()
     cell.bench.open(run=1.0)
     cell.bench.lose_port()
-    interlocks.wind_down()
-    assert not interlocks.has_to_wait(is_open=False)  # all are safe
-    assert (interlocks.unconfirmed(cell.now), interlocks.not_repeated()) == (
+    interlocks.end.wind_down()
+    assert not interlocks.end.has_to_wait(is_open=False)  # all are safe
+    assert (interlocks.end.unconfirmed(cell.now), interlocks.end.not_repeated()) == (
         [], ['speed', 'other'])
-    interlocks.resume()
+    interlocks.end.resume()
     cell.bench.open(run=1.0)
     cell.publish(speed, 42, run=0.1)
     cell.bench.lose_port()
-    interlocks.wind_down()
-    assert interlocks.has_to_wait(is_open=False)
-    assert not interlocks.has_to_wait(is_open=False, is_meant=lambda row: row is other)
+    interlocks.end.wind_down()
+    assert interlocks.end.has_to_wait(is_open=False)
+    assert not interlocks.end.has_to_wait(is_open=False, is_meant=lambda row: row is other)
     cell.bench.driver.take_over(cell.bench.driver)
     after = Cell(speed, other, start=False).bench.driver  # of new files, on the lost port
-    assert not after.interlocks.has_to_wait(is_open=False)
+    assert not after.interlocks.end.has_to_wait(is_open=False)
     after.take_over(cell.bench.driver)
-    assert after.interlocks.has_to_wait(is_open=False)
+    assert after.interlocks.end.has_to_wait(is_open=False)
 
 
 def test_rule_5_what_stands_is_written_once_more_at_the_end_after_all_else() -> None:
@@ -319,11 +319,11 @@ def test_rule_5_what_was_under_way_when_the_end_began_is_written_once_more(text:
     cell.bench.run_until(lambda: cell.word(text) != 99)  # its reply is not here yet
     interlocks = begin_end(cell)
     store(cell.plc, text, [98])
-    while interlocks.has_to_wait(is_open=True):
+    while interlocks.end.has_to_wait(is_open=True):
         assert cell.now < 2.0
         cell.run(0.005)
     assert cell.word(text) == (0 if text == 'N10:0' else 7)
-    assert (interlocks.unconfirmed(cell.now), interlocks.not_repeated()) == ([], [])
+    assert (interlocks.end.unconfirmed(cell.now), interlocks.end.not_repeated()) == ([], [])
 
 
 @pytest.mark.parametrize('fault', ['refused', 'silent', 'no answer'])
@@ -338,9 +338,9 @@ def test_rule_5_what_stands_has_one_try_and_is_named_where_it_is_not_written_aga
     else:
         cell.is_late = True
     interlocks, since = begin_end(cell), cell.now
-    while interlocks.has_to_wait(is_open=True):
+    while interlocks.end.has_to_wait(is_open=True):
         assert cell.now < since + 2.0
         cell.run(0.005)
-    assert (interlocks.unconfirmed(cell.now), interlocks.not_repeated()) == (
+    assert (interlocks.end.unconfirmed(cell.now), interlocks.end.not_repeated()) == (
         [], ['beat', 'speed'])
     assert cell.refusals == (2 if fault == 'refused' else 0)

@@ -82,7 +82,7 @@ def test_rule_5_what_may_still_land_after_the_end_is_named() -> None:
     cell.ask('N7:0', 99)
     cell.run(0.02)
     end(cell)
-    unconfirmed, = cell.bench.driver.interlocks.unconfirmed(cell.now)
+    unconfirmed, = cell.bench.driver.interlocks.end.unconfirmed(cell.now)
     what, _, left = unconfirmed.partition(' for ')
     assert what == 'speed (a gateway may hold a write to it'
     assert 0.0 < float(left.removesuffix(' s)')) <= 20.0
@@ -165,9 +165,9 @@ def test_rule_19_own_0_of_an_end_that_lands_after_a_reload_is_no_other_program(
 
     hold(cell, 0.95, is_meant)
     interlocks = cell.bench.driver.interlocks
-    interlocks.wind_down()
+    interlocks.end.wind_down()
     cell.bench.line.wake(cell.bench.driver.machine)
-    while not interlocks.is_over:
+    while not interlocks.end.is_over:
         cell.run(0.01)
     assert left[0] < 0
     cell.bench.hand_over([replace(row) for row in (beat, speed)[:1 + has_speed]])
@@ -264,7 +264,7 @@ def test_rule_5_commands_of_guests_are_not_sent_while_the_bridge_ends() -> None:
     cell = Cell(speed_row(), run=1.0)
     driver, sts = cell.bench.driver, []
     cell.refused = {'N7:0'}  # so that the end lasts
-    driver.interlocks.wind_down()
+    driver.interlocks.end.wind_down()
     command = Packet(1, 9, 0x0F, 0, 1, bytes.fromhex('67 00 00 01 00 07 00 07 00 42 2A 00'))
     driver.guests.put(GuestCommand(Guest('pty:hmi', ShareAccess.ALL), command, cell.now,
                                    lambda reply: sts.append(reply.sts)))

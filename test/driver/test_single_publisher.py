@@ -177,9 +177,9 @@ def test_rule_28_end_is_over_while_two_publish() -> None:
     speed = single_row()
     cell = Cell(speed, run=1.0)
     cell.bench.write(speed, [3], run=0.5)
-    cell.bench.driver.interlocks.wind_down()
+    cell.bench.driver.interlocks.end.wind_down()
     crowd(cell)
     cell.run(0.3)
-    assert cell.bench.driver.interlocks.is_over
+    assert cell.bench.driver.interlocks.end.is_over
     assert cell.results()[2:] == [END]
     assert cell.word('N7:0') == 7

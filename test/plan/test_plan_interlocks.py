@@ -296,11 +296,11 @@ def test_rule_5_orderly_end_has_the_time_that_is_printed(stands: bool) -> None:
     for plc in plcs if stands else ():
         store(plc, 'N7:0', [42] * 5)  # by another program
     begun, interlocks = bench.line.now, bench.driver.interlocks
-    interlocks.wind_down()
+    interlocks.end.wind_down()
     bench.line.wake(bench.driver.machine)
-    bench.run_until(lambda: interlocks.is_over, LONGEST_END)
+    bench.run_until(lambda: interlocks.end.is_over, LONGEST_END)
     assert bench.line.now - begun < end
-    assert interlocks.unconfirmed(bench.clock()) == interlocks.not_repeated() == []
+    assert interlocks.end.unconfirmed(bench.clock()) == interlocks.end.not_repeated() == []
     assert [stored(plc, 'N7:0', 5) for plc in plcs] == [bytes([7, 0] * 5)] * 5
 
 
@@ -333,9 +333,9 @@ def test_rules_5_and_16_end_where_no_plc_answers_has_the_time_that_is_printed(
     printed = Times(network, Rows(rows)).end_in_silence
     assert printed is not None
     heard.clear()
-    interlocks.wind_down()
+    interlocks.end.wind_down()
     bench.line.wake(bench.driver.machine)
-    bench.run_until(lambda: interlocks.is_over, printed)
+    bench.run_until(lambda: interlocks.end.is_over, printed)
     tries = [row.dialect.write(row.address, bytes([7, 0]))[1] for row in rows if row.fallback]
     assert [heard.count(body) for body in tries] == [stations] * len(tries)
 

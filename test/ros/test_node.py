@@ -342,7 +342,7 @@ def test_bytes_that_come_are_judged_anew_at_each_opening_of_the_port(
 def test_end_is_not_taken_back_by_a_request(
         make_bench: Benches, monkeypatch: pytest.MonkeyPatch, capfd: Output) -> None:
     bench = make_bench(SPEED)
-    session, resume = bench.node.session, bench.node.session.driver.interlocks.resume
+    session, resume = bench.node.session, bench.node.session.driver.interlocks.end.resume
     session.events.unreadable(session.driver.mappings[0], 'no such file')
     monkeypatch.setattr(session.driver.interlocks, 'resume',
                         lambda: (bench.node.begin_end(), resume()))  # it ends meanwhile
@@ -352,7 +352,7 @@ def test_end_is_not_taken_back_by_a_request(
     assert (polling.success, polling.message) == (False, 'this node ends')
     reload = bench.call(Trigger, 'reload', Trigger.Request())
     assert (reload.success, reload.message) == (False, 'this node ends')
-    assert session.driver.interlocks.is_ending
+    assert session.driver.interlocks.end.is_asked
     assert not bench.node.hand_over(session.configuration)
     assert bench.node.session is session
 

@@ -209,10 +209,11 @@ def test_end_waits_for_a_port_that_was_lost_unless_it_was_left_or_is_of_a_spare(
     session: Any = Mock(is_waiting=False, _surroundings=Mock(link=link))
     session.configuration.parameters.standby = is_spare
     interlocks = session.driver.interlocks
-    interlocks.has_to_wait.return_value = True
+    interlocks.end.has_to_wait.return_value = True
     assert BridgeSession.has_to_wait(session, bool) is waits
-    assert interlocks.has_to_wait.call_args_list == [call(is_open=is_open, is_meant=bool)] * waits
-    interlocks.unconfirmed.return_value, interlocks.not_repeated.return_value = ['beat'], ['speed']
+    end = interlocks.end
+    assert end.has_to_wait.call_args_list == [call(is_open=is_open, is_meant=bool)] * waits
+    end.unconfirmed.return_value, end.not_repeated.return_value = ['beat'], ['speed']
     told = BridgeSession.tell_unconfirmed(session, 'ends')
     notes = session.events.notes
     assert len(told) == notes.error.call_count + notes.warning.call_count

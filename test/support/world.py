@@ -1000,10 +1000,11 @@ class World(DriverBench):
         """Write what an end writes, and wait for it, as the node does (rule 5)."""
         interlocks = self.driver.interlocks
         self.ended = self.line.now
-        interlocks.wind_down()
+        interlocks.end.wind_down()
         self.line.wake(self.driver.machine)
         give_up = self.line.now + limit
-        while self.line.now < give_up and interlocks.has_to_wait(is_open=self.driver.is_online):
+        while self.line.now < give_up \
+                and interlocks.end.has_to_wait(is_open=self.driver.is_online):
             self.run(STEP / 10)
 
     def end(self) -> None:

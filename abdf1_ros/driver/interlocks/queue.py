@@ -29,6 +29,7 @@ from operator import attrgetter
 from random import Random
 
 from abdf1_ros.driver.flights import Flight, WriteListener
+from abdf1_ros.driver.interlocks.end import OrderlyEnd
 from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackRow, FallbackState
 from abdf1_ros.driver.interlocks.heartbeat import HeartbeatRow, LARGEST
 from abdf1_ros.driver.interlocks.own import Conditions, Crowd
@@ -62,7 +63,9 @@ class Interlocks(WriteListener):
       each other if both counted from 1.
     - ``ours``: the rows of our own table; ``expire`` has work when ``ours`` has to be looked at.
 
-    Only ``executor_ran``, ``crowd``, ``wind_down`` and ``resume`` may be called from another
+    - ``end``: the orderly end.
+
+    Only ``executor_ran`` and ``crowd``, and two methods of ``end``, may be called from another
     thread.
     """
 
@@ -93,15 +96,7 @@ class Interlocks(WriteListener):
         self._served = served
         self._listener, self._warn = listener, warn
         self._has_begun = False
-        # stations that answered when the end began
-        self._awaited: frozenset[int] = frozenset()
-        # rows that stood, or were under way, when the end began: until they are written once more
-        self._standing: tuple[OwnRow, ...] = ()
-
-    @property
-    def is_ending(self) -> bool:
-        """Tell whether the bridge is to end."""
-        return self.conditions.is_ending
+        self.end = OrderlyEnd(self._plc_of, self.ours, flights, conditions)
 
     # What happens
 
@@ -118,90 +113,13 @@ class Interlocks(WriteListener):
         """
         self.conditions.crowds[topic] = crowd
 
-    def wind_down(self) -> None:
-        """
-        Write heartbeats 0, then fallbacks, and take no more messages (rule 5).
-
-        Then the caller has to wake the link, and to wait as long as it ``has_to_wait``.
-        ``unconfirmed`` returns the rows that are not confirmed then, ``not_repeated`` those that
-        were confirmed before.
-        """
-        self.conditions.is_ending = True
-
-    def resume(self) -> None:
-        """Continue after ``wind_down``: the next opening of the port is a first contact."""
-        self.conditions.is_ending, self.conditions.ended = False, math.inf
-        self._standing = ()
-
-    @property
-    def is_over(self) -> bool:
-        """
-        Tell whether all writes of the end are done.
-
-        Stations that were active when the end began have confirmed all their rows. At silent
-        stations each row has had its try, and so has each row that stood.
-        """
-        return not self._plc_of or self.conditions.are_all_due and not self._is_repeating \
-            and not any(row.mapping.station in self._awaited or row.is_under_way
-                        or row.tried < self.conditions.ended
-                        for row in self._plc_of if not row.is_confirmed)
-
-    @property
-    def _is_repeating(self) -> bool:
-        """Tell whether a row that stood when the end began has still to be written once more."""
-        return any(row.is_under_way or row.tried < self.conditions.ended for row in self._standing)
-
-    def has_to_wait(self, *, is_open: bool,
-                    is_meant: Callable[[Mapping], bool] = lambda mapping: True) -> bool:
-        """
-        Tell whether writes of the end are left that a caller has to wait for (rule 5).
-
-        While the port is lost, these are rows of PLCs that ``is_meant``. Nothing is to wait for if
-        no write has gone out since the start.
-        """
-        if self.is_over:
-            return False
-        return is_open or self._writing.flights.has_sent and any(
-            is_meant(row.mapping) for row in self._unconfirmed_rows())
-
-    @property
-    def keeps_line(self) -> bool:
-        """
-        Tell whether nothing may be read: it is the end, and a PLC that answers has not confirmed.
-
-        A read of a PLC that fails could take all the time that is left, also before a second write
-        that is not due yet (rules 5, 10).
-        """
-        return self.conditions.are_all_due and (self._is_repeating or any(
-            plc.is_active and not row.is_confirmed for row, plc in self._plc_of.items()))
-
-    def _unconfirmed_rows(self) -> Iterator[OwnRow]:
-        """Return the rows of PLCs where a command may stand, also while the port is lost."""
-        may_begin = self._writing.flights.may_begin
-        return (row for plc in self.plcs.values() for row in plc.rows
-                if not row.is_confirmed or not may_begin(row.mapping))
-
-    def unconfirmed(self, now: float) -> list[str]:
-        """Return the tags of rows that are not confirmed at the end, or may be overwritten."""
-        tags = [row.mapping.tag for row in self._unconfirmed_rows()]
-        held = {row.mapping.tag: row.words.lands_until - now for plc in self.plcs.values()
-                for row in plc.rows if row.mapping.tag not in tags and row.words.lands_until > now}
-        return [*tags, *(f'{tag} (a gateway may hold a write to it for {seconds:.1f} s)'
-                         for tag, seconds in held.items())]
-
-    def not_repeated(self) -> list[str]:
-        """Return the tags of rows that stood when the end began, and were not confirmed again."""
-        rows = self._standing if self.conditions.are_all_due else [
-            row for plc in self.plcs.values() for row in plc.rows if row.is_confirmed]
-        return [row.mapping.tag for row in rows]
-
     def begin(self, now: float) -> None:
         """
         Begin a first contact with each station: the port has been opened (rule 2).
 
         An end that has lost the port begins anew.
         """
-        self.conditions.ended, self._standing = math.inf, ()
+        self.end.begin_anew()
         self._writing.flights.opened()
         if not self._has_begun:
             for row in self.fallbacks:
@@ -257,7 +175,7 @@ class Interlocks(WriteListener):
     def is_overruled(self, write: Write) -> bool:
         """Tell whether the end has begun, or a fallback was sent after a message (rules 5, 9)."""
         row = self._by_mapping.get(write.mapping)
-        return row is not None and (self.conditions.are_all_due or write.requested <= row.sent)
+        return row is not None and (self.end.has_begun or write.requested <= row.sent)
 
     def why_refused(self, write: Write) -> str:
         """Return why the publishers of a topic forbid a message, empty if they do not (28)."""
@@ -267,7 +185,7 @@ class Interlocks(WriteListener):
 
     def new_crowds(self, now: float) -> Iterator[tuple[Mapping, str]]:
         """Make the fallbacks of new crowds due; yield their rows, each with the reason (28)."""
-        if not self._has_begun or self.is_ending:
+        if not self._has_begun or self.end.is_asked:
             return
         for row in self._single:
             crowd = self.conditions.crowds.get(row.mapping.topic)
@@ -327,8 +245,8 @@ class Interlocks(WriteListener):
         """Record the end of a message to a row, or of a guest's write of its words."""
         row.write_ended(flight, now)
         if not row.is_confirmed:
-            self._leave_standing(row)
-        if isinstance(row, FallbackRow) and not row.stands and self.conditions.are_all_due:
+            self.end.leave_standing(row)
+        if isinstance(row, FallbackRow) and not row.stands and self.end.has_begun:
             row.make_due(FallbackCause.END, now)
 
     def write_expired(self, write: Write) -> None:
@@ -343,9 +261,9 @@ class Interlocks(WriteListener):
              only_active: bool = False) -> WriteJob | None:
         """Return the next own write, None for none; ``only_active``: not for silent PLCs."""
         self.expire(now)
-        if not self.conditions.are_all_due:
+        if not self.end.has_begun:
             return self._first(now, busy, only_active)
-        only_active |= self._waits_for_active
+        only_active |= self.end.waits_for_active
         self._writing.stations.probes.keep_none_waiting(now)
         return self._first(now, busy, only_active) or self._once_more(now, busy, only_active)
 
@@ -369,7 +287,7 @@ class Interlocks(WriteListener):
 
     def _once_more(self, now: float, busy: Container[int], only_active: bool) -> WriteJob | None:
         """Return the write of a row that stood when the end began: after all else (rule 5)."""
-        rows = [row for row in self._to_repeat(only_active) if row.mapping.station not in busy]
+        rows = [row for row in self.end.to_repeat(only_active) if row.mapping.station not in busy]
         if not rows:
             return None
         row = min(rows, key=lambda row: not self._plc_of[row].is_active)
@@ -378,25 +296,10 @@ class Interlocks(WriteListener):
         row.repeat = job.flight
         return job
 
-    def _to_repeat(self, only_active: bool) -> Iterator[OwnRow]:
-        """Return the rows that stood when the end began, and were not sent since."""
-        return (row for row in self._standing if row.tried < self.conditions.ended
-                and (self._plc_of[row].is_active or not only_active))
-
     def _answer_within(self, plc: Plc) -> float:
         """Return for how long (s) at most to wait for an answer: not for long at the end."""
-        is_last = self.conditions.are_all_due and not plc.is_active
+        is_last = self.end.has_begun and not plc.is_active
         return LAST_ANSWER if is_last else math.inf
-
-    @property
-    def _waits_for_active(self) -> bool:
-        """
-        Tell whether silent PLCs have to wait for the reply of a PLC that answers: it is the end.
-
-        They have no later chance, but PLCs that answer go first.
-        """
-        return self.conditions.are_all_due and any(
-            row.is_under_way and plc.is_active for row, plc in self._plc_of.items())
 
     def _begin(self, plc: Plc, row: OwnRow, youngest: dict[Mapping, float],
                now: float) -> WriteJob:
@@ -464,21 +367,12 @@ class Interlocks(WriteListener):
             row.ended(now)
         else:
             self._fallback_ended(row, write, outcome, now)
-        if outcome is Outcome.WRITTEN:
-            if row.tried < self.conditions.ended < math.inf:  # under way when the end began
-                self._standing += (row,)
-            else:
-                self._leave_standing(row)
+        self.end.confirmed(row, outcome)
         if outcome is not Outcome.NOT_SENT:
             refusal = '' if outcome is Outcome.WRITTEN else str(flight.error)
             if isinstance(flight.error, RemoteError) and refusal != row.refusal:
                 self._listener.unreadable(row.mapping, f'not written: {refusal}')
             row.refusal = refusal
-
-    def _leave_standing(self, row: OwnRow) -> None:
-        """Record that a row is not to be written once more: it was, or it is due by now."""
-        if row in self._standing:  # another thread reads them
-            self._standing = tuple(other for other in self._standing if other is not row)
 
     def _fallback_ended(self, row: FallbackRow, write: Write, outcome: Outcome,
                         now: float) -> None:
@@ -492,8 +386,10 @@ class Interlocks(WriteListener):
         """Do the work that needs no line: begin the end, store due fallbacks of our own table."""
         if not self._has_begun:
             return
-        if self.is_ending and not self.conditions.are_all_due:
-            self._make_all_due(now)
+        if self.end.is_asked and not self.end.has_begun:
+            for row in self.fallbacks:
+                self._writes.drop('fallback', now, row.mapping)
+            self.end.begin(now)
         if now < self.ours.looks.first:
             return
         flights = self._writing.flights
@@ -503,21 +399,10 @@ class Interlocks(WriteListener):
             self._served.store(write.mapping, write.raw)
             flights.ended(own.trial, Outcome.WRITTEN)
 
-    def _make_all_due(self, now: float) -> None:
-        for row in self.fallbacks:
-            self._writes.drop('fallback', now, row.mapping)
-        are_due = {row: row.end(now) for row in self._plc_of}
-        self._standing = tuple(row for row, plc in self._plc_of.items()
-                               if not are_due[row] and plc is not self.ours)
-        self._awaited = frozenset(plc.station for plc in self.plcs.values() if plc.is_active)
-        self.conditions.ended = now
-        for plc in (*self.plcs.values(), self.ours):
-            plc.look_again()
-
     def next_due(self) -> float:
         """Return when the next write is due (clock value in s), infinite for never."""
-        due, only_active = math.inf, self._waits_for_active
-        if any(self._to_repeat(only_active)):
+        due, only_active = math.inf, self.end.waits_for_active
+        if any(self.end.to_repeat(only_active)):
             return -math.inf
         for plc in self.plcs.values():
             if not only_active or plc.is_active:

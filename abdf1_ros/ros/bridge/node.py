@@ -282,7 +282,7 @@ class BridgeNode(AnsweringNode):
         if self._is_ending:
             response.message = ENDS
         elif request.data:
-            self.session.driver.interlocks.resume()
+            self.session.driver.interlocks.end.resume()
             if self._is_ending:  # the end has begun meanwhile
                 self.session.begin_end()
             self.link.take()

@@ -255,7 +255,7 @@ class BridgeSession:
     def begin_end(self) -> None:
         """Begin to set heartbeats to 0 and write fallbacks (rule 5); ``tell_plcs`` waits."""
         self.events.unreadable_rows.tell()
-        self.driver.interlocks.wind_down()
+        self.driver.interlocks.end.wind_down()
         self._wake_link()
 
     def has_to_wait(self, is_meant: Callable[[Mapping], bool]) -> bool:
@@ -269,7 +269,7 @@ class BridgeSession:
         is_open = link.state.is_open
         is_gone = link.is_released or self.configuration.parameters.standby
         return link.is_alive() and (is_open or not is_gone) \
-            and self.driver.interlocks.has_to_wait(is_open=is_open, is_meant=is_meant)
+            and self.driver.interlocks.end.has_to_wait(is_open=is_open, is_meant=is_meant)
 
     def tell_unconfirmed(self, what: str) -> list[str]:
         """
@@ -282,10 +282,10 @@ class BridgeSession:
         if self.is_waiting or self.configuration.parameters.standby and not has_line:
             return []
         interlocks, notes, told = self.driver.interlocks, self.events.notes, list[str]()
-        if tags := interlocks.unconfirmed(line_time()):
+        if tags := interlocks.end.unconfirmed(line_time()):
             told.append(f'{what} before the PLC has confirmed: {first(tags)}')
             notes.error(f'rows as it {what}', told[-1])
-        if tags := interlocks.not_repeated():
+        if tags := interlocks.end.not_repeated():
             told.append(f'{what}; confirmed before, but not written again: {first(tags)}')
             notes.warning(f'rows as it {what}', told[-1])
         return told

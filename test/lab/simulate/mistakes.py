@@ -54,6 +54,7 @@ from abdf1_ros.driver.agenda import Agenda
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.flights import Flight, Words
 from abdf1_ros.driver.guests import GuestJob
+from abdf1_ros.driver.interlocks.end import OrderlyEnd
 from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackRow
 from abdf1_ros.driver.interlocks.heartbeat import HeartbeatRow
 from abdf1_ros.driver.interlocks.plc import Plc
@@ -252,7 +253,7 @@ def _waits_for_no_port(has_to_wait: Any) -> Any:
 
 
 def _lets_stand(make_all_due: Any) -> Any:
-    def make_due_wrongly(self: Interlocks, now: float) -> None:
+    def make_due_wrongly(self: OrderlyEnd, now: float) -> None:
         make_all_due(self, now)
         self._standing = ()
 
@@ -352,11 +353,11 @@ MISTAKES = (
             lambda before: property(lambda self: True)),
     Mistake('4', 'a silent PLC is polled before its fallback', HalfDuplexMaster, 'carry_out',
             _polls_before),
-    Mistake('5', 'the end does not wait for silent PLCs', Interlocks, 'is_over',
+    Mistake('5', 'the end does not wait for silent PLCs', OrderlyEnd, 'is_over',
             _awaits_those_that_answer),
-    Mistake('5', 'the end does not wait for a lost port', Interlocks, 'has_to_wait',
+    Mistake('5', 'the end does not wait for a lost port', OrderlyEnd, 'has_to_wait',
             _waits_for_no_port),
-    Mistake('5', 'what stands is not written at the end', Interlocks, '_make_all_due',
+    Mistake('5', 'what stands is not written at the end', OrderlyEnd, 'begin',
             _lets_stand),
     Mistake('6', 'a message is not too old when it is sent', WriteJob, '__init__',
             _never_too_old),

@@ -229,7 +229,7 @@ class Story:
         world.wind_down(HAND_OVER)
         self.judge.look()  # at what came for the rows of before
         interlocks = world.driver.interlocks
-        named = interlocks.unconfirmed(world.line.now) + interlocks.not_repeated()
+        named = interlocks.end.unconfirmed(world.line.now) + interlocks.end.not_repeated()
         if not world.plant.is_read_only:
             self._demand_safe_words(text.partition(' ')[0] for text in named)
         world.reload()

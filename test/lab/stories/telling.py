@@ -356,7 +356,7 @@ class Telling:
 
         def open_again() -> None:
             if world.process == process and not world.driver.is_online:
-                world.driver.interlocks.resume()
+                world.driver.interlocks.end.resume()
                 self._cut_off()
                 world.open()
                 world.opened = world.line.now
@@ -367,16 +367,16 @@ class Telling:
                    is_meant: Callable[[Mapping], bool] = lambda row: True) -> None:
         """Write all 0s and Fallbacks, wait for them, judge what the log names, and go on."""
         world, driver = self.world, self.world.driver
-        if driver.interlocks.is_ending or world.line.now < world.away or not world.is_alive:
+        if driver.interlocks.end.is_asked or world.line.now < world.away or not world.is_alive:
             raise Pointless
         world.ended = world.line.now
-        driver.interlocks.wind_down()
+        driver.interlocks.end.wind_down()
         world.line.wake(driver.machine)
 
         def look() -> None:
             if world.driver is not driver:
                 return  # it was killed
-            waits = driver.interlocks.has_to_wait(is_open=driver.is_online, is_meant=is_meant)
+            waits = driver.interlocks.end.has_to_wait(is_open=driver.is_online, is_meant=is_meant)
             if not waits or world.line.now >= world.ended + limit:
                 self._demand_named()
                 then()
@@ -389,7 +389,7 @@ class Telling:
         """Demand that the end names each word that is not safe; none if nothing was wrong (5)."""
         watched, interlocks = self.world.plcs[1], self.world.driver.interlocks
         named = {text.split(' ')[0] for text in (
-            *interlocks.unconfirmed(self.world.line.now), *interlocks.not_repeated())}
+            *interlocks.end.unconfirmed(self.world.line.now), *interlocks.end.not_repeated())}
         is_well = self._ill_until == -math.inf
         for row in (*interlocks.fallbacks, *interlocks.heartbeats):
             tag = row.mapping.tag

@@ -22,7 +22,7 @@ from typing import Any
 from unittest import mock
 
 from abdf1_ros.driver.flights import Flights, Words
-from abdf1_ros.driver.interlocks.queue import Interlocks
+from abdf1_ros.driver.interlocks.end import OrderlyEnd
 import pytest
 from stories.scenes import SCENES, SMALL
 from stories.walk import Ledger, shortest, story_of, tell, text_of, Walk
@@ -79,7 +79,7 @@ def _always(value: object) -> Callable[..., object]:
     (Flights, 'has_gateway', _always(False), 'little free',
      'at 0.5: before speed last\nwrite 3: not delivered', 'Belief'),
     (Words, 'again_at', _always(math.inf), 'little beat', 'write 2: kept last', 'Belief'),
-    (Interlocks, 'unconfirmed', _always([]), 'little end', 'write 2: kept 2\nat 0.95: end 0.3',
+    (OrderlyEnd, 'unconfirmed', _always([]), 'little end', 'write 2: kept 2\nat 0.95: end 0.3',
      'Named'),
     (Words, 'are_ours', lambda self, but=None: self.last is not None, 'little sts', '',
      'Belief')])
