@@ -240,4 +240,4 @@ NOTATIONS: tuple[tuple[Notation, ...], ...] = (
     (Tokens('octal', '[0-7]{3}', _of_numbers(8)),
      Tokens('decimal', r'\d{1,3}', _of_numbers(10)),
      DIGITS,
-     Tokens('octal words', '[0-7]{6}', _of_words(8), is_words=True)))
+     Tokens('octal words', '[01][0-7]{5}', _of_words(8), is_words=True)))

@@ -220,8 +220,9 @@ class TextReader:
             cut = next((_Stop(*pair) for pair in sample if is_cut(pair[1])), stop)
             raise cut.problem(self._name) from None
         if best is None:
-            raise TextProblem(self._name, 'no line has bytes; write them as in 10 05 01 FF, or '
-                              'for a file of raw bytes give --binary')
+            raise TextProblem(f'{self._name}:1', (
+                'no line has bytes; write them as in 10 05 01 FF, or for a file of raw bytes give '
+                '--binary'))
         self.told = best.describe()
         rest = ((number, line) for number, line in enumerate(lines, len(sample) + 1))
         try:

@@ -350,6 +350,16 @@ def test_a_long_text_is_never_in_the_memory_as_a_whole() -> None:
     assert int(next(lines)[:7], 16) == 16 * 3001  # one line ahead
 
 
+def test_octal_words_of_od_give_back_their_bytes() -> None:
+    data = b''.join(data for _, data in LONG) + b'\0'
+    lines = [f'{at:07o} ' + ' '.join(
+        f'{int.from_bytes(row[n:n + 2], "little"):06o}' for n in range(0, len(row), 2))
+        for at, row in rows(data)]
+    assert joined([*lines, f'{len(data):07o}']) == data
+    with pytest.raises(Problem):  # more than 16 bits
+        read(['0000000 777777', '0000002'])
+
+
 @for_all(('lines', 'text'), [
     (['0000000 0210', '*', '0000040'], '"hexdump -v" makes no "[*]"'),
     (['0000000 0210 0310', '0000004 0310', '0000006 0310', '0000009 0310'],
