@@ -13,8 +13,11 @@
 # limitations under the License.
 
 """
-Maps made of exports of other programs, one module for each format.
+Maps made of exports of other programs, and of lists.
+
+``records.py`` reads cells, ``table.py`` finds the columns, ``form.py`` makes rows, ``imported.py``
+a map. A form is data in ``forms.py``: headings by role, words for types, and its own rules.
 
 A row that cannot become a mapping stays in the map as a comment, and is reported with its line. A
-row may write to the PLC only if the file says so.
+row may write to the PLC only if the file says so, and if everything in the row is understood.
 """
