@@ -251,7 +251,7 @@ class Telling:
             world.command(1, 0x0F, b'\x68\0\0')
             return
         address = world.plcs[1].place_of({'speed': OUTPUTS, 'beat': BEAT}[argument])
-        dialect = world.rows[_SPEED].dialect
+        dialect = world.rows['clock_1'].dialect  # the row of the word may be gone
         world.command(1, *dialect.write(address, world.next_of_guests.to_bytes(2, 'little')))
 
     def deliver_from_before(self, argument: str) -> None:
@@ -440,11 +440,11 @@ class Telling:
 
     def _demand_belief(self) -> None:
         """Demand that each word holds what the driver believes: a Fallback, or 0."""
-        watched = self.world.plcs[1]
         interlocks = self.world.driver.interlocks
         for row in (*interlocks.fallbacks,
                     *(beat for beat in interlocks.heartbeats if beat.topics)):
             tag = row.mapping.tag
+            watched = self.world.plcs[row.mapping.station]
             value = watched.word(watched.places[tag])
             if self._is_unknowable(tag):
                 continue
