@@ -48,8 +48,8 @@ class _Failures:
     The failures of a command in a row: ``count``, and the last ``error``.
 
     The ``first`` failure and the failure that ended at ``when`` are clock values (s). The last one
-    took ``took`` seconds of the line. ``replies`` is the number of replies of its ``station`` at
-    the last failure.
+    took ``took`` seconds of the line; ``others`` is ``OddCommands.others`` by then. ``replies`` is
+    the number of replies of its ``station`` at the last failure.
     """
 
     error: LinkError
@@ -59,6 +59,7 @@ class _Failures:
     replies: int = -1
     when: float = -math.inf
     took: float = 0.0
+    others: float = 0.0
 
 
 class OddCommands:
@@ -80,6 +81,7 @@ class OddCommands:
     def __init__(self, replies: Callable[[int], int]) -> None:
         self.turns = Probes(0.0)
         self.next_suspect = self.message_failed_at = -math.inf
+        self.others = 0.0  # seconds of the line that failed reads and messages have had
         self._replies = replies
         self.failed: dict[Hashable, _Failures] = {}
 
@@ -129,12 +131,14 @@ class OddCommands:
         """
         Return from when on (clock value, s) an own write may be tried again.
 
-        After a try that took t it waits ``share`` times t, and a second at least.
+        After a try that took t it waits ``share`` times t, and a second at least. Tries of others
+        that fail do not count: commands that pass shall have this time.
         """
         found = self.failed.get(key)
         if found is None or found.count < _ODD:
             return -math.inf
-        return found.when + max(_LEAST_PAUSE, share * found.took)
+        pause = max(_LEAST_PAUSE, share * found.took)
+        return found.when + pause + self.others - found.others
 
     def judge(self, key: Hashable, station: int, error: LinkError, now: float, *,
               is_counted: bool) -> LinkError:
@@ -159,9 +163,10 @@ class OddCommands:
         """Record that a command had the line for ``seconds`` until now, and has failed."""
         if was_odd:
             found = self.failed[key]
-            found.when, found.took = now, seconds
+            found.when, found.took, found.others = now, seconds, self.others
         if asker is Asker.OWN:
             return
+        self.others += seconds
         if asker is Asker.MESSAGE:
             self.message_failed_at = now
         else:

@@ -314,6 +314,34 @@ def test_good_rows_wait_for_one_failed_try_while_odd_messages_are_found(
     assert last == 5 * [Outcome.WRITTEN]
 
 
+@LONG_MODES
+def test_good_rows_do_not_wait_for_an_odd_fallback_and_odd_reads_together(mode: str) -> None:
+    """Otherwise the reads that fail take all the time that the fallback leaves."""
+    files, a_try = range(60, 70), longest_tries(mode)
+    good = [make_mapping(f'N{file}:0', plc='SLC', length=8, period=500) for file in range(20, 30)]
+    odd = [make_mapping(f'N{file}:0', plc='SLC', length=4, period=500) for file in files]
+    fallback = make_mapping('N40:0', 'Write', plc='SLC', fallback=Fallback((7,), 1000))
+    plc = Plc(mode, fate=of_files(Fate.LOST, 40, *files))
+    bench = DriverBench([*good, *odd, fallback, COMMAND], network=network(mode), far=plc)
+
+    def publish() -> None:
+        bench.write(COMMAND, [len(bench.listener.results) % 1000])
+        bench.at(bench.clock() + 1.0, publish)
+
+    publish()
+    bench.run(120.0)
+    found = 10.0 + 6 * a_try
+    for row in good:
+        most = 8 / 7 * bench.driver.points[row].stale_time + a_try
+        times = [when for when in (*bench.listener.times(row), 120.0) if when > found]
+        assert max(after - before for before, after in pairwise(times)) < most, row.tag
+    tries = [when for when, data in plc.tried if file_of(data) == 40]
+    assert max(after - before for before, after in pairwise(tries)) < 1.0 + 4 * a_try
+    assert len(bench.listener.reasons) == 10
+    outcomes = [result.outcome for result in bench.listener.results]
+    assert outcomes.count(Outcome.WRITTEN) >= 0.9 * len(outcomes) > 100
+
+
 @ALL_MODES
 def test_row_comes_again_at_once_when_its_reply_passes(mode: str) -> None:
     odd = make_mapping('N9:0', plc='SLC', period=200)
