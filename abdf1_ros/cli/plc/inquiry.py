@@ -74,7 +74,8 @@ def conclude(session: Judged, neighbours: Neighbours = tuple) -> None:
         examination = Examination(session, session.silent, neighbours)
         facts = presence.facts(network, session.counters, session.stray, examination.traces)
         complain(str(examination.cause()))
-        complain(facts)
+        then = ', '.join(question.value for question in examination.asked)
+        complain(f'{facts}; then asked: {then}' if then else facts)
     elif network.line_mode.is_master and (heard := session.traces(network.station)).masters:
         complain(str(diagnose(heard)))
 
@@ -101,13 +102,14 @@ class Examination:
     Questions about a station that has not answered; none of them writes to a PLC.
 
     ``session`` has ended. There are at most three questions, without a retry, in 3 s. None is
-    asked after polls of another master, at a gateway, as a slave and by radio.
+    asked after polls of another master, at a gateway, as a slave and by radio. ``asked`` has the
+    questions that were asked.
     """
 
     def __init__(self, session: Judged, station: int, neighbours: Neighbours) -> None:
         self._session, self._neighbours = session, neighbours
         self._ends = time.monotonic() + _BUDGET
-        self._asked: set[Decider] = set()
+        self.asked: list[Decider] = []
         self.traces = session.traces(station)
         if session.network.line_mode.is_master and self.traces.gateway is None:
             self._look_at_others()
@@ -124,8 +126,8 @@ class Examination:
     def _may_ask(self, question: Decider) -> bool:
         traces, mode = self.traces, self._session.network.line_mode
         is_alone = mode.has_one_plc or mode.is_master and not traces.foreign_polls
-        return (is_alone and traces.gateway is None and question not in self._asked
-                and len(self._asked) < _MOST_QUESTIONS
+        return (is_alone and traces.gateway is None and question not in self.asked
+                and len(self.asked) < _MOST_QUESTIONS
                 and self._ends - time.monotonic() >= _LEAST_LEFT)
 
     def cause(self) -> Diagnosis:
@@ -133,9 +135,11 @@ class Examination:
         found = diagnose(self.traces)
         try:
             while (question := found.rule.asks) is not None and self._may_ask(question):
-                self._asked.add(question)
-                self.traces = self._answered(question)
-                found = diagnose(self.traces)
+                if (answered := self._answered(question)) is self.traces:
+                    break  # there is no other station to ask
+                self.asked.append(question)
+                self.traces = answered
+                found = diagnose(answered)
         except (PortLost, OSError, KeyboardInterrupt):
             pass
         return found

@@ -150,9 +150,12 @@ def test_silent_station_beside_one_that_answers(tmp_path: Path, capsys: Output) 
             assert cause(said).startswith(
                 'station 2 is silent, and station 1 answers: port and settings are right. Next: '
                 'look at station 2: power')
+            assert said.err.endswith(
+                '0 NAK; then asked: one poll of the station, one poll of another station\n')
         said = call(main, capsys, *READ, '--station', '2', '--port', name, *IMPATIENT)
     assert cause(said).startswith('not one character came, not even to a poll: no station 2 (a')
     assert '"plc scan 0-31" shows whether other stations answer' in cause(said)
+    assert said.err.endswith('0 NAK; then asked: one poll of the station\n')
 
 
 def test_silence_in_full_duplex_blames_no_number(tmp_path: Path, capsys: Output) -> None:
