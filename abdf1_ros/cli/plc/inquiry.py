@@ -172,9 +172,9 @@ class Examination:
         """Return new traces of the line, with the answers so far."""
         before = self.traces
         return replace(
-            seen, takes_other_check=before.takes_other_check, neighbour=before.neighbour,
-            neighbour_answers=before.neighbour_answers, is_garbled=before.is_garbled,
-            is_acknowledged=before.is_acknowledged)
+            seen, takes_other_check=seen.takes_other_check or before.takes_other_check,
+            neighbour=before.neighbour, neighbour_answers=before.neighbour_answers,
+            is_garbled=before.is_garbled, is_acknowledged=before.is_acknowledged)
 
     def _with_echoes(self, network: Network) -> Traces:
         """Return the traces with the bytes that do not pass, though others do."""
