@@ -37,7 +37,7 @@ PARTS: dict[tuple[str, str], Callable[[], str]] = {
     ('CONTRIBUTING.md', 'rooms'): tables.rooms,
     ('docs/architecture.md', 'drawing'): drawing.mermaid,
     ('wireshark/abdf1.lua', 'tables'): dissector.lua,
-    ('docs/heartbeats.md', 'bounds'): tables.bounds,
+    (f'{REFERENCE}/bounds.md', 'bounds'): tables.bounds,
     ('docs/protocol/framing.md', 'symbols'): tables.symbols,
     ('docs/protocol/full_duplex.md', 'message'): partial(
         conversations.dialogue, 'peer_transaction_2'),
