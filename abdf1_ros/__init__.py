@@ -41,6 +41,7 @@ The rooms of the package, from the wire up. A room imports only from rooms above
 
 - ``df1``: the link. Its input is bytes and time, its output bytes and a deadline
 - ``pccc``: commands, addresses, values, and a folder for each family of PLCs
+- ``cip``: EtherNet/IP around a command, for programs that speak Ethernet alone
 - ``settings``: both CSV files, every fault with its place
 - ``plan``: which words are read together, and the times of the line
 - ``driver``: which job has the line next, and its result

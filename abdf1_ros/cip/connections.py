@@ -97,16 +97,23 @@ class CipConnection:
             return seen
         self._seen.pop(count, None)
         self._seen[count] = _Repeatable(request)
-        if len(self._seen) > _MOST_SEEN:
-            del self._seen[next(iter(self._seen))]
+        answered = [number for number, seen in self._seen.items() if seen.response is not None]
+        if answered and len(self._seen) > _MOST_SEEN:
+            del self._seen[answered[0]]
         return None
 
-    def answered(self, count: int, request: bytes, told: bytes, now: float) -> None:
-        """Keep a response, in case the request is repeated."""
+    def answered(self, count: int, request: bytes, told: bytes, now: float) -> bool:
+        """
+        Keep a response, in case the request is repeated.
+
+        Return False if the client has used the count for another request since.
+        """
         self.expires = max(self.expires, now + self.patience)
         seen = self._seen.get(count)
-        if seen is not None and seen.request == request:
-            seen.response = told
+        if seen is None or seen.request != request:
+            return False
+        seen.response = told
+        return True
 
 
 class CipConnections:

@@ -278,7 +278,8 @@ class EipSession:
             return
         if len(told) + 2 > connection.size:
             told = CipRefusal(CipStatus.REPLY_TOO_LARGE).response(told[0])
-        connection.answered(count, request, told, now)
+        if not connection.answered(count, request, told, now):
+            return
         self._send(message.reply(bytes(_UNIT_HEADER) + encode_items(
             (EipItem.CONNECTED_ADDRESS, connection.their_number.to_bytes(4, 'little')),
             (EipItem.CONNECTED_DATA, word(count) + told))))

@@ -137,6 +137,11 @@ def test_who_we_are() -> None:
     assert {part[:4] for part in parts} == {bytes.fromhex('8E 00 00 00')}
 
 
+def test_place_of_ipv6_tells_no_address_of_ipv4() -> None:
+    listed = CipIdentity(1).listed('::1', 44818)
+    assert listed[8:24] == bytes.fromhex('0002 AF12 00000000') + bytes(8)
+
+
 @for_all(('cip', 'told'), [
     (b'\x05' + bytes.fromhex('02 20 01 24 01'), '85 00 08 00'),  # reset
     (b'\x10' + bytes.fromhex('03 20 01 24 01 30 07 41'), '90 00 08 00'),  # write an attribute
@@ -332,7 +337,30 @@ def test_repeated_request_is_carried_out_once() -> None:
     for later in range(6, 22):  # 16 are known
         end.answer(end.command(connected(execute(READ), HANDLE, number, later)))
     assert len(end.say(connected(execute(READ), HANDLE, number, 6))) == 1 and not end.asked
+    end.answer(end.command(connected(execute(READ), HANDLE, number, 22)))
     end.command(connected(execute(READ[:-1] + b'\1'), HANDLE, number, 5))
+
+
+def test_late_reply_is_not_taken_for_the_reply_to_a_request_that_has_its_count() -> None:
+    end = End()
+    number = end.open()
+    late = end.command(connected(execute(READ), HANDLE, number, 5))
+    other = end.command(connected(execute(READ[:-1] + b'\1'), HANDLE, number, 5))
+    late.respond(REPLY, end.now)
+    assert end.replies() == []
+    assert end.say(connected(execute(READ[:-1] + b'\1'), HANDLE, number, 5)) == []
+    assert end.asked == []
+    assert end.answer(other, REPLY[:-2] + b'\x01\x00').cip.endswith(b'\x01\x00')
+
+
+def test_request_under_way_is_known_however_many_follow() -> None:
+    end = End()
+    number = end.open()
+    first = end.command(connected(execute(READ), HANDLE, number, 1))
+    for later in range(2, 60):
+        end.answer(end.command(connected(execute(READ), HANDLE, number, later)))
+    assert end.say(connected(execute(READ), HANDLE, number, 1)) == [] and end.asked == []
+    assert end.answer(first).cip[:2] == bytes((1, 0))
 
 
 def test_reply_is_for_the_connection_that_asked_or_for_nobody() -> None:
