@@ -494,9 +494,10 @@ class BeatsAfterFallbacks(Rule):
             self._over[entry.tag] = entry.when
 
     def sent(self, entry: Sent) -> None:
-        if not entry.tag.startswith('beat') or entry.value in (0, *GUESTS):
-            return
         world = self.world
+        if not entry.tag.startswith('beat') or entry.value in (0, *GUESTS) \
+                or entry.when < world.killed_at:  # of the process before
+            return
         for tag in [row.tag for row in world.rows_of(entry.station)]:
             holds, youngest = self._holds.get(tag), world.youngest.get(tag, -math.inf)
             self.demand(holds is not None and holds.driver == world.drivers,

@@ -51,7 +51,9 @@ def test_all_stories_keep_the_rules_and_reach_what_is_stored(name: str, deviatio
 @pytest.mark.parametrize(('name', 'text'), [
     *((name, '') for name in SCENES if name not in SMALL),
     # A guest writes the word of a row that new files do not have.
-    ('direct', 'at 0.35: reload speed gone\nat 0.95: guest speed')])
+    ('direct', 'at 0.35: reload speed gone\nat 0.95: guest speed'),
+    # The number of a process that is killed while it is on the line.
+    ('direct', 'at 0.05: message\nat 0.65: kill 0.3')])
 def test_story_of_a_large_scene_can_be_told(name: str, text: str) -> None:
     assert tell_broken(name, text) == ''
 
