@@ -20,15 +20,14 @@ from dataclasses import dataclass
 
 from abdf1_ros.df1.mode import LineMode
 from abdf1_ros.df1.odd import DAMAGED
-from abdf1_ros.df1.stations import ActiveStationList, MOST_IN_VAIN
-from abdf1_ros.errors import NoWholeReply
+from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.messages import Message
 
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
     """
-    What a line has shown of a station; as text: the cause and the cure, empty for none.
+    What a line has shown of a station; ``diagnosis`` finds the cause.
 
     - ``gateway``: the number of its gateway, None if the station is on the line itself.
     - ``has_own_ack``: an ACK shows that the station is there. Otherwise a gateway sends it, or the
@@ -46,31 +45,6 @@ class Evidence:
     fault: Message | None
     is_left_alone: bool
     is_only_acknowledged: bool
-
-    def __str__(self) -> str:
-        """Return the cause and the cure."""
-        other = self.other_number
-        if other is not None and self.gateway is None:
-            return (f'replies come to number {other}, not to ours: a gateway such as the 1770-KF2 '
-                    f'and KF3 replies to its own number. Make it our Station: {other} in net.csv, '
-                    f'or --own-station {other} of "plc"')
-        if self.fault is not None:
-            return (f'station {self.station} replies, but {NoWholeReply(cause=self.fault)}: does '
-                    'something on the way change bytes (flow control, a telnet port)?')
-        if not self.is_only_acknowledged:
-            return ''
-        if self.gateway is not None:
-            return (f'gateway {self.gateway} acknowledges commands to station {self.station}, and '
-                    f'no reply comes: is the number right? "plc scan 0-63 --via {self.gateway}" '
-                    'shows which stations reply')
-        if self.is_left_alone:
-            return (f'station {self.station} is not asked any more: {MOST_IN_VAIN} commands in a '
-                    'row were acknowledged and had no reply. Each may cost an SLC with passthru '
-                    'one of 30 buffers until it is switched off. A write, ~/read_now or a new '
-                    'start of the node asks again; is the number right?')
-        return (f'commands to station {self.station} are acknowledged, and no reply comes: is the '
-                'number right? An SLC with passthru, or a gateway, acknowledges commands for all '
-                'stations; "plc scan 0-63" shows which stations reply')
 
 
 def evidence_of(mode: LineMode, stations: ActiveStationList, number: int) -> Evidence:
