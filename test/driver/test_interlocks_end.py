@@ -211,6 +211,17 @@ def test_rule_5_silent_plc_is_not_due_at_the_end_while_another_has_not_answered(
     assert driver.interlocks.next_due() == math.inf
 
 
+def test_rule_5_plc_that_has_just_left_a_command_unanswered_goes_last_at_the_end() -> None:
+    """Two waits for it would take all the time of ~/polling and ~/reload."""
+    rows = speed_row(), make_mapping('N7:0', 'Write', station=2, fallback=FALLBACK)
+    driver = Cell(*rows, start=False).bench.driver
+    driver.interlocks.begin(0.0)
+    driver.stations[1].unanswered = 1
+    driver.interlocks.end.wind_down()
+    first = driver.interlocks.next(0.0)
+    assert first is not None and first.station == 2
+
+
 def test_rule_5_what_was_not_confirmed_at_the_end_is_named() -> None:
     cell = Cell(beat_row(), speed_row(), start=False)
     assert cell.bench.driver.interlocks.end.unconfirmed(cell.now) == ['beat', 'speed']

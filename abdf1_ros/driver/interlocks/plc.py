@@ -244,10 +244,11 @@ class Plc:
         Return the rank of a row, the least goes first; None if it has to wait (rules 10, 11).
 
         The order is (1) first tries; (2) PLCs that answer; (3) PLCs that do not. First tries go
-        first because a PLC may execute a write that it does not answer. In (1) PLCs that answer go
-        first. In (3) the row with the fewest tries goes first, then the row whose last try is
-        oldest. Otherwise a 0 that is due each second would take all turns. Silent PLCs get only
-        the time of probes. At the end a silent PLC has one try for each row.
+        first because a PLC may execute a write that it does not answer. In (1) PLCs that have
+        answered the last command go first: an end may have no time for others. In (3) the row with
+        the fewest tries goes first, then the row whose last try is oldest. Otherwise a 0 that is
+        due each second would take all turns. Silent PLCs get only the time of probes. At the end a
+        silent PLC has one try for each row.
 
         Heartbeats that are due give way to one fallback that stands, after each of them has had a
         turn. All such fallbacks could take longer than the preset of a PLC.
@@ -258,7 +259,8 @@ class Plc:
         is_zero = isinstance(row, HeartbeatRow) and row.wants_zero
         is_beat = isinstance(row, HeartbeatRow) and not row.wants_zero
         if row.is_first_try and not is_beat:
-            return 0, not self.answers, not is_zero
+            is_doubtful = self._stations[self.station].unanswered > 0
+            return 0, not self.answers or is_doubtful, not is_zero
         if self.answers:
             if isinstance(row, FallbackRow) and row.stands:
                 had_turn = now if conditions.is_beats_turn else conditions.gave_way
