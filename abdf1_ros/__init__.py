@@ -37,11 +37,13 @@ Importing this package imports no other module: a name is looked up when it is u
 ``abdf1_ros.ros`` and a few commands need ROS.
 
 The rooms of the package, from the wire up. A room imports only from rooms above it in this list;
-``driver`` and ``ports`` also import from ``sniffer``. Each ``__init__`` describes its room:
+``driver``, ``ports`` and ``diagnosis`` also import from ``sniffer``. Each ``__init__`` describes
+its room:
 
 - ``df1``: the link. Its input is bytes and time, its output bytes and a deadline
 - ``pccc``: commands, addresses, values, and a folder for each family of PLCs
 - ``cip``: EtherNet/IP around a command, for programs that speak Ethernet alone
+- ``diagnosis``: from what a line has shown to one cause and one next step
 - ``settings``: both CSV files, every fault with its place
 - ``plan``: which words are read together, and the times of the line
 - ``driver``: which job has the line next, and its result

@@ -177,7 +177,7 @@ class _Stop(Exception):
     """The number and the text of a line that does not fit, and the reason if there is one."""
 
     def __init__(self, number: int, line: str, reason: str = '') -> None:
-        super().__init__(reason)
+        super().__init__(number, line, reason)
         self.number, self.line, self.reason = number, line, reason
 
     def problem(self, name: str) -> TextProblem:

@@ -344,7 +344,7 @@ def test_end_is_not_taken_back_by_a_request(
     bench = make_bench(SPEED)
     session, resume = bench.node.session, bench.node.session.driver.interlocks.end.resume
     session.events.unreadable(session.driver.mappings[0], 'no such file')
-    monkeypatch.setattr(session.driver.interlocks, 'resume',
+    monkeypatch.setattr(session.driver.interlocks.end, 'resume',
                         lambda: (bench.node.begin_end(), resume()))  # it ends meanwhile
     bench.node.set_polling(SetBool.Request(data=True), SetBool.Response())
     assert 'no such file' in capfd.readouterr().err
