@@ -169,6 +169,8 @@ class Handshake(Node):
             print(f'job {number} has begun', flush=True)
             step = self._request(number, done_within, lambda step: step is Step.DONE)
         self._requests.publish(Int16MultiArray(data=[0]))
+        # The last message would be lost with its publisher if the program ended at once.
+        self._requests.wait_for_all_acked(Duration(seconds=1))
         if self._crowd:
             print(f'job {number}: unknown: {self._crowd}')
             return UNKNOWN

@@ -86,6 +86,7 @@ def run(plc: Plc, state: list[int], *args: str, result: str = 'written',
         observer.node.create_subscription(Int16MultiArray, '/fake/write/job_request', take, 10)
         with Process(EXAMPLE, '--node', '/fake', '--patience', '1', *args) as example:
             observer.until(lambda: not example.is_running, 'the example to end')
+            observer.until(lambda: not requests or not requests[-1], 'its last request, a 0')
             return example.result(), example.lines, requests
 
 
