@@ -30,9 +30,9 @@ from abdf1_ros.cli.plc.log_file import (
     ANSWERS_AGAIN,
     Cell,
     HEARD_AGAIN,
+    Log,
     LogFile,
     LogLost,
-    LogOutput,
     LogRow,
 )
 from abdf1_ros.cli.plc.reading import NoValue, RepeatedReads, WatchedRead
@@ -60,7 +60,7 @@ class ValueLog(RepeatedReads):
     """
 
     def __init__(self, network: Network, mappings: Sequence[Mapping], period: float,
-                 output: LogFile | LogOutput, tags: Tags | None = None,
+                 output: Log, tags: Tags | None = None,
                  record: str | None = None) -> None:
         self._output = output
         self._progress = Progress() if is_terminal(sys.stderr) else None
@@ -135,7 +135,7 @@ def _cells(mapping: Mapping, values: Values) -> tuple[Cell, list[str]]:
 
 
 def log_values(options: argparse.Namespace, targets: Targets,
-               output: LogFile | LogOutput, may_listen: bool = False) -> int:
+               output: Log, may_listen: bool = False) -> int:
     """
     Log until Ctrl-C, or until --count reads; return the exit status.
 
@@ -154,7 +154,7 @@ def log_values(options: argparse.Namespace, targets: Targets,
 
 
 def _ask(options: argparse.Namespace, session: Session, targets: Targets,
-         output: LogFile | LogOutput) -> int:
+         output: Log) -> int:
     mappings = mappings_of(options, session, targets)
     session.close()  # the driver opens the port itself
     return _log(options, session.network, mappings, targets, output)
@@ -175,7 +175,7 @@ def _heard_rows(options: argparse.Namespace, targets: Targets, network: Network)
 
 
 def _log(options: argparse.Namespace, network: Network, mappings: Sequence[Mapping],
-         targets: Targets, output: LogFile | LogOutput) -> int:
+         targets: Targets, output: Log) -> int:
     log = ValueLog(network, mappings, options.period, output, targets.tags,
                    options.record)
     return concluded(log, log.run(options.count))

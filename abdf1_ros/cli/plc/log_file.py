@@ -167,16 +167,16 @@ class LogLost(Exception):
     """The log cannot be written any more; the text says why, and how much is in it."""
 
 
-class LogOutput:
-    """The log on standard output; a file that ``>>`` continues keeps its one head."""
+class Log:
+    """A log, row by row; a continued log has no second head. ``count`` is the number of rows."""
 
     def __init__(self, form: LogForm) -> None:
         self._form = form
         self.count = 0
-        self._is_continued = _is_our_output(form)
+        self._is_continued = False
 
     def begin(self) -> None:
-        """Write what stands before the first row."""
+        """Write what stands before the first row of this run."""
         if self._is_continued:
             self._put(self._form.line(_continued()))
         elif self._form.head:
@@ -187,6 +187,22 @@ class LogOutput:
         if lines := [*map(self._form.line, rows)]:
             self._put('\n'.join(lines))
             self.count += len(lines)
+
+    def _put(self, text: str) -> None:
+        """Write lines at once; raises LogLost, and BrokenPipeError if the reader has left."""
+        raise NotImplementedError
+
+    def close(self) -> None:
+        """End the log."""
+        raise NotImplementedError
+
+
+class LogOutput(Log):
+    """The log on standard output; a file that ``>>`` continues keeps its one head."""
+
+    def __init__(self, form: LogForm) -> None:
+        super().__init__(form)
+        self._is_continued = _is_our_output(form)
 
     def _put(self, text: str) -> None:
         try:
@@ -223,7 +239,7 @@ def _lost(name: str, error: OSError, count: int) -> str:
     return f'{reason_of(name, error)}; the log ends here, after {count} rows of this run'
 
 
-class LogFile:
+class LogFile(Log):
     """
     A log on the disk that is continued, row by row.
 
@@ -233,9 +249,9 @@ class LogFile:
     """
 
     def __init__(self, path: str, form: LogForm) -> None:
+        super().__init__(form)
         self.path = path
-        self._form = form
-        self.count = self._size = 0
+        self._size = 0
         self.remark = ''
         self._is_new = not os.path.exists(path)
         try:
@@ -271,6 +287,7 @@ class LogFile:
         else:
             self._size = self._end_of_rows()
         os.ftruncate(self._file, self._size)
+        self._is_continued = self._size > 0
 
     def _end_of_rows(self) -> int:
         """Return the size without the rest of a row."""
@@ -285,19 +302,6 @@ class LogFile:
 
     def _fault(self, text: str) -> ConfigurationError:
         return ConfigurationError([Problem('--to', f'{self.path} {text}; give another name')])
-
-    def begin(self) -> None:
-        """Write what stands before the first row of this run."""
-        if self._size:
-            self._put(self._form.line(_continued()))
-        elif self._form.head:
-            self._put(self._form.head)
-
-    def write(self, rows: Iterable[LogRow]) -> None:
-        """Write rows; raises LogLost."""
-        if lines := [*map(self._form.line, rows)]:
-            self._put('\n'.join(lines))
-            self.count += len(lines)
 
     def _put(self, text: str) -> None:
         left = data = f'{text}\n'.encode()
