@@ -188,6 +188,7 @@ class Driver:
         """Take what the driver of the old files knows: new files change nothing on the line."""
         self.served.take_over(before.served)
         self._flights.take_over(before._flights)
+        self.interlocks.end.take_over(before.interlocks.end)
         for station in before.stations:
             if station.number in self.stations:
                 self.stations[station.number].has_gateway |= station.has_gateway

@@ -224,9 +224,9 @@ def test_rule_11_first_tries_go_first_then_plcs_that_answer() -> None:
     one.fallback(one.row.take(5.0), 5.1, Outcome.UNKNOWN)
     assert plc.rank(one.row, 8.0) == (3, False, 1, 5.0)  # its first try again
     one.row.tries, plc.pause_end = 7, 99.0
-    for conditions.is_ending in (False, True):
+    for conditions.is_paused in (False, True):
         assert bool(plc.rank(one.row, 8.0)) is conditions.is_ending
-    conditions.is_ending = False
+    conditions.is_paused = False
     stations.lost(1, 8.0)  # probes have a pause of their own
     assert plc.rank(one.row, 90.0) == (3, False, 3, 5.0)
     stations.heard(1, 91.0)

@@ -355,3 +355,23 @@ def test_rule_5_what_stands_has_one_try_and_is_named_where_it_is_not_written_aga
     assert (interlocks.end.unconfirmed(cell.now), interlocks.end.not_repeated()) == (
         [], ['beat', 'speed'])
     assert cell.refusals == (2 if fault == 'refused' else 0)
+
+
+def test_rule_5_final_end_outlives_requests_and_new_files() -> None:
+    speed = speed_row(Fallback((7,), 20_000))
+    cell = Cell(speed, start=False)
+    cell.bench.open(run=1.0)
+    cell.publish(speed, 42, run=0.1)
+    paused = cell.bench.driver.interlocks.end
+    paused.wind_down()
+    cell.bench.hand_over([speed])
+    assert not cell.bench.driver.interlocks.end.is_asked  # new files are a start
+    cell.run(1.0)
+    final = cell.bench.driver.interlocks.end
+    final.wind_down(is_final=True)
+    final.resume()
+    assert final.is_asked
+    cell.bench.hand_over([speed])
+    cell.publish(speed, 43, run=1.0)
+    assert cell.bench.driver.interlocks.end.is_over
+    assert cell.word('N7:0') == 7

@@ -445,11 +445,11 @@ def test_messages_wait_for_the_first_look_and_have_a_result_at_an_end_before_it(
     bench.publisher(msg.Int16MultiArray, 'recipe')(1, 2)
     refuse = bench.node.session.begin_end
 
-    def refuse_after_a_while() -> None:
+    def refuse_after_a_while(*, is_final: bool) -> None:
         for _ in range(3):
             assert ros.get_parameters(bench.ros, 'port') == [bench.plcs.port]
         assert not bench.node.writes.taken
-        refuse()
+        refuse(is_final=is_final)
 
     monkeypatch.setattr(bench.node.session, 'begin_end', refuse_after_a_while)
     bench.node.begin_end()

@@ -222,7 +222,8 @@ def test_end_waits_for_a_port_that_was_lost_unless_it_was_left_or_is_of_a_spare(
 
 
 def test_spare_does_not_look_for_the_line_while_it_ends() -> None:
-    node: Any = Mock(_is_ending=True)
+    node: Any = Mock()
+    node.session.is_ending = True
     BridgeNode.check(node)
     assert node.session.check.called
     assert not node.standby.look.called

@@ -222,8 +222,9 @@ def test_line_of_a_device_server_is_ours_when_any_station_has_answered_since_it_
         f"call.{level}('the port', '{port}: {is_open}')"
         for level, is_open in (
             ('info', True), ('error', False), ('info', True), ('info', False))]
-    session.driver.interlocks.end.wind_down.side_effect = around.link.wake.reset_mock
+    around.link.wake.reset_mock()
     session.begin_end()
+    session.driver.interlocks.end.wind_down.assert_called_once_with(is_final=False)
     session.go_on()
     for opened in around.services.open, around.writes.open:
         opened.call_args.args[3]()

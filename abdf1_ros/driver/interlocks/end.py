@@ -34,7 +34,7 @@ from abdf1_ros.settings.mapping import Mapping
 
 class OrderlyEnd:
     """
-    The end of a bridge, and of a driver before ~/reload or ~/polling.
+    The end of a bridge for good, and of a driver before ~/reload or ~/polling.
 
     ``plc_of`` has the PLC of each row, ``ours`` the rows of our own table. Only ``wind_down`` and
     ``resume`` may be called from another thread.
@@ -57,24 +57,39 @@ class OrderlyEnd:
         return self._conditions.is_ending
 
     @property
+    def is_final(self) -> bool:
+        """Tell whether the bridge ends for good: nothing can cancel it."""
+        return self._conditions.is_final
+
+    @property
     def has_begun(self) -> bool:
         """Tell whether all rows are due."""
         return self._conditions.are_all_due
 
-    def wind_down(self) -> None:
+    def wind_down(self, *, is_final: bool = False) -> None:
         """
         Write heartbeats 0, then fallbacks, and take no more messages (rule 5).
+
+        It counts at once, in any thread. ``resume`` does not cancel an end that ``is_final``, and
+        ``take_over`` hands it on.
 
         Then the caller has to wake the link, and to wait as long as it ``has_to_wait``.
         ``unconfirmed`` returns the rows that are not confirmed then, ``not_repeated`` those that
         were confirmed before.
         """
-        self._conditions.is_ending = True
+        if is_final:
+            self._conditions.is_final = True
+        else:
+            self._conditions.is_paused = True
 
     def resume(self) -> None:
         """Continue after ``wind_down``: the next opening of the port is a first contact."""
-        self._conditions.is_ending, self._conditions.ended = False, math.inf
+        self._conditions.is_paused, self._conditions.ended = False, math.inf
         self._standing = ()
+
+    def take_over(self, before: OrderlyEnd) -> None:
+        """Go on with the final end of the driver before: it may have begun during ~/reload."""
+        self._conditions.is_final |= before.is_final
 
     @property
     def is_over(self) -> bool:

@@ -48,7 +48,9 @@ class Conditions:
     - ``messages``: publication time of the last accepted message of each topic.
     - ``crowds``: the last crowd of each topic of rows with Single_Publisher. The thread of the
       callbacks sets it before it hands on a message that came since.
-    - ``is_ending``: the bridge ends; ``ended``: when the end began, infinite before it.
+    - ``is_final``: the bridge ends; ``is_paused``: it gives up the port, or its files. Each of
+      them has one thread that sets it.
+    - ``ended``: when the end began, infinite before it.
     - ``gave_way``: when heartbeats last gave way to a fallback that stands.
     - ``is_beats_turn``: they have just given way to such a fallback, or to a read.
     """
@@ -56,10 +58,16 @@ class Conditions:
     executor: float = -math.inf
     messages: dict[str, float] = field(default_factory=dict)
     crowds: dict[str, Crowd] = field(default_factory=dict)
-    is_ending: bool = False
+    is_final: bool = False
+    is_paused: bool = False
     ended: float = math.inf
     gave_way: float = -math.inf
     is_beats_turn: bool = False
+
+    @property
+    def is_ending(self) -> bool:
+        """Tell whether the bridge is to end, for good or for a while."""
+        return self.is_final or self.is_paused
 
     @property
     def are_all_due(self) -> bool:

@@ -87,7 +87,7 @@ class BridgeNode(AnsweringNode):
         validate_node_name(name)  # if rclpy refuses the name, it also warns about its own cleanup
         options['automatically_declare_parameters_from_overrides'] = True
         super().__init__(name, **options)
-        self._is_stuck = self._is_ending = False
+        self._is_stuck = False
         self._hold_ports = partial(
             (port_owners or PortOwners()).hold, self.get_fully_qualified_name())
         try:
@@ -158,9 +158,15 @@ class BridgeNode(AnsweringNode):
         self.link.start()
 
     def begin_end(self) -> None:
-        """Begin the end of the bridge and its session; no request can cancel it."""
-        self._is_ending = True
-        self.session.begin_end()  # first, so that messages that have waited are refused
+        """
+        Begin the end of the bridge and its session; no request can cancel it.
+
+        If ~/reload puts in a new session meanwhile, the new session has to end as well.
+        """
+        told: BridgeSession | None = None
+        while told is not self.session:  # first, so that messages that have waited are refused
+            told = self.session
+            told.begin_end(is_final=True)
         self.writes.begin()
 
     def end_calls(self) -> None:
@@ -181,7 +187,7 @@ class BridgeNode(AnsweringNode):
     def check(self) -> None:
         """Publish what is due; take writes after the first look for a node of our name."""
         self.session.check()
-        if self.session.configuration.parameters.standby and not self._is_ending:
+        if self.session.configuration.parameters.standby and not self.session.is_ending:
             self.standby.look()
         if self.surroundings.names.has_looked:
             self.writes.begin()
@@ -202,7 +208,7 @@ class BridgeNode(AnsweringNode):
 
     def _reload(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Read both files again and use them; if they have faults, go on with the old files."""
-        if self._is_ending:
+        if self.session.is_ending:
             response.message = ENDS
             return response
         before = self.session.configuration
@@ -222,7 +228,7 @@ class BridgeNode(AnsweringNode):
         if self.hand_over(configuration):
             response.success = True
             response.message = f'{printable(str(configuration))}; {changes(before, configuration)}'
-        elif self._is_ending:  # the end has begun meanwhile
+        elif self.session.is_ending:  # the end has begun meanwhile
             response.message = ENDS
         else:
             response.message = 'ends: the link does not accept the new files'
@@ -247,7 +253,7 @@ class BridgeNode(AnsweringNode):
         left_behind = rows_left_behind(before.configuration, configuration)
         tell_plcs([before], 'goes on with new files', HAND_OVER,
                   is_meant=left_behind.__contains__)
-        if self._is_ending:  # the end has begun meanwhile
+        if before.is_ending:  # the end has begun meanwhile
             return False
         try:
             session = BridgeSession(self.surroundings, configuration)
@@ -269,8 +275,6 @@ class BridgeNode(AnsweringNode):
         if not is_done:
             return False
         self.session.begin()
-        if self._is_ending:  # the end has begun meanwhile
-            self.session.begin_end()
         self.session.guests.start()
         self._shown.show(configuration.network, configuration.shown_rows())
         self._hold_ports(*configuration.held)
@@ -279,12 +283,10 @@ class BridgeNode(AnsweringNode):
     def set_polling(self, request: SetBool.Request,
                     response: SetBool.Response) -> SetBool.Response:
         """Release the port for other programs, or take it back."""
-        if self._is_ending:
+        if self.session.is_ending:
             response.message = ENDS
         elif request.data:
             self.session.driver.interlocks.end.resume()
-            if self._is_ending:  # the end has begun meanwhile
-                self.session.begin_end()
             self.link.take()
             response.success, response.message = True, f'{self.session.port} is being opened'
         else:

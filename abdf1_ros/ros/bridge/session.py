@@ -252,10 +252,15 @@ class BridgeSession:
         self.link_counters.end()
         self.owners.end()
 
-    def begin_end(self) -> None:
+    @property
+    def is_ending(self) -> bool:
+        """Return True if the bridge ends for good."""
+        return self.driver.interlocks.end.is_final
+
+    def begin_end(self, *, is_final: bool = False) -> None:
         """Begin to set heartbeats to 0 and write fallbacks (rule 5); ``tell_plcs`` waits."""
         self.events.unreadable_rows.tell()
-        self.driver.interlocks.end.wind_down()
+        self.driver.interlocks.end.wind_down(is_final=is_final)
         self._wake_link()
 
     def has_to_wait(self, is_meant: Callable[[Mapping], bool]) -> bool:
