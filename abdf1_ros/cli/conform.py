@@ -205,7 +205,7 @@ def _judge(options: argparse.Namespace, target: Target, cases: Sequence[Case], w
     if wire.noise:
         tell('conform', f'{wire.noise} bytes outside of any symbol were ignored: noise, or a '
              'wrong speed or parity?')
-    if not wire.has_heard:
+    if not wire.reader.has_heard:
         tell('conform', _NOBODY)
         return EXIT_FAILED
     verdicts = {result.verdict for result in results}

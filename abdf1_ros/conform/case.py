@@ -21,7 +21,8 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any, Protocol, TypeAlias
 
-from abdf1_ros.conform.wire import Failed, Sent, Skipped, Wire
+from abdf1_ros.conform.transcript import Sent
+from abdf1_ros.conform.wire import Failed, Skipped, Wire
 
 
 class Target(Enum):
@@ -149,4 +150,4 @@ def run_cases(cases: Iterable[Case], wire: Wire, end: End,
 def _told(wire: Wire, begun: float) -> tuple[str, ...]:
     return tuple(
         f'{(entry.at - begun) * 1000:9.1f} ms {"we  " if isinstance(entry, Sent) else "they"} '
-        f'{entry.raw.hex(" ").upper()}' for entry in wire.transcript)
+        f'{entry.raw.hex(" ").upper()}' for entry in wire.transcript.entries)

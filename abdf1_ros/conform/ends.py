@@ -170,7 +170,7 @@ class AskingEnd(ABC):
 
     def check_target(self) -> None:
         """Send a command if the case has ended without an answer; Skipped if no reply comes."""
-        if not self.wire.is_unanswered:
+        if not self.wire.transcript.is_unanswered:
             return
         for _ in range(MOST_TRIES):
             with suppress(Failed):

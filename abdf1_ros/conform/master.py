@@ -94,7 +94,7 @@ def no_needless_reset(end: SlaveEnd) -> None:
     for _ in range(_COMMANDS):
         end.finish(end.next_command())
     resets = sum(isinstance(entry, Symbol) and entry.kind is SymbolKind.NAK
-                 for entry in end.wire.transcript)
+                 for entry in end.wire.transcript.entries)
     if resets > 1:
         raise Failed('no DLE NAK while all is answered', f'{resets} beside {_COMMANDS} commands')
 

@@ -18,22 +18,16 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 import math
 from typing import Protocol
 
 from abdf1_ros.conform import codec
 from abdf1_ros.conform.codec import BlockCheck, Symbol, SymbolKind
+from abdf1_ros.conform.reader import SymbolReader
+from abdf1_ros.conform.transcript import Sent, Transcript
 
-# Longest time (s) of a symbol that has begun. On a slow line, it is the time of the longest frame.
-_FRAME_TIME = 3.0
-_LONGEST_FRAME = 1000  # bytes; twice the largest packet, if every byte of it is doubled
-
-_MOST_UNREAD = 65536
 _QUIET = 0.2  # s without a byte
 _DLE = b'\x10'
-_NO_ANSWERS = (SymbolKind.NOISE, SymbolKind.NAK, SymbolKind.EOT)
-_NOT_TO_BE_TAKEN = (SymbolKind.ACK, SymbolKind.NAK, SymbolKind.POLL)
 
 # Longest time of restoring the words of the target, in answer times: a late reply, and then a
 # command with its reply.
@@ -55,14 +49,6 @@ class Hear(Protocol):
 
     def __call__(self, within: float | None, *, answers: bool) -> Symbol | None:
         """Return the next symbol; None if no symbol begins within ``within`` s."""
-
-
-@dataclass(frozen=True, slots=True)
-class Sent:
-    """Bytes that we have sent, and the time (s)."""
-
-    at: float
-    raw: bytes
 
 
 class Failed(Exception):
@@ -90,14 +76,14 @@ class Wire:
 
     ``answer_time`` is the longest time (s) of an answer, and the time without bytes that counts as
     silence. It counts from the end of the sent bytes, at ``char_time`` s a byte. With ``is_radio``
-    no message has a response, so DLE ENQ gets none. ``transcript`` keeps all bytes in order;
-    ``has_heard`` tells whether any byte came. ``hear`` returns a response inside a message before
-    that message. ``enquired_after`` is the shortest time (s) from a message of the target to its
-    DLE ENQ, ``begun`` the time when the line was there. With ``passes_commands`` a command of the
-    target itself, such as a MSG of its program, is acknowledged and ignored. Bytes outside of any
-    symbol are ignored, as M 4-7 to 4-9 requires, and counted in ``noise``; DLE with a code that no
-    symbol has is an answer. By radio a forwarded reply that comes again is ignored, too (ML11 517
-    to 522).
+    no message has a response, so DLE ENQ gets none. ``transcript`` has the bytes of the case,
+    ``reader`` the bytes that are not a symbol yet. ``hear`` returns a response inside a message
+    before that message. ``enquired_after`` is the shortest time (s) from a message of the target
+    to its DLE ENQ, ``begun`` the time when the line was there. With ``passes_commands`` a command
+    of the target itself, such as a MSG of its program, is acknowledged and ignored. Bytes outside
+    of any symbol are ignored, as M 4-7 to 4-9 requires, and counted in ``noise``; DLE with a code
+    that no symbol has is an answer. By radio a forwarded reply that comes again is ignored, too
+    (ML11 517 to 522).
     """
 
     def __init__(self, line: RawLine, check: BlockCheck, clock: Callable[[], float], *,
@@ -109,15 +95,14 @@ class Wire:
         self._passes_commands = passes_commands
         self._limit = math.inf
         self.answer_time = answer_time
-        self.transcript: list[Sent | Symbol] = []
-        self.has_heard = False
+        self.transcript = Transcript(check, is_half_duplex)
+        self.reader = SymbolReader(self._read, clock, check, is_half_duplex=is_half_duplex,
+                                   char_time=char_time)
         self.noise = 0
         self._line = line
         self._clock = clock
         self.begun = clock()
         self._char_time = char_time
-        self._buffer = b''
-        self._symbol_begun = 0.0
         self._embedded: deque[Symbol] = deque()
         self._sent_until = 0.0
         self._response = codec.NAK
@@ -137,26 +122,8 @@ class Wire:
 
     def begin(self, limit: float) -> None:
         """Begin a case of at most ``limit`` s; after that time it is Skipped."""
-        self.transcript.clear()
+        self.transcript.entries.clear()
         self.allow(limit)
-
-    @property
-    def is_unanswered(self) -> bool:
-        """
-        Tell whether neither DLE ACK nor a reply has come since we last sent anything to be taken.
-
-        That is anything but polls and responses. DLE EOT, DLE NAK and commands are no answers:
-        they come from a target that takes nothing, too.
-        """
-        for entry in reversed(self.transcript):
-            if isinstance(entry, Symbol):
-                if entry.kind not in _NO_ANSWERS and not codec.is_command(entry):
-                    break
-                continue
-            sent = codec.next_symbol(entry.raw, self.check, self.is_half_duplex)
-            if sent is None or sent.kind not in _NOT_TO_BE_TAKEN or not sent.is_good:
-                return True
-        return False
 
     def allow(self, seconds: float) -> None:
         """Give the case ``seconds`` from now, whatever it has taken."""
@@ -171,7 +138,7 @@ class Wire:
     def send(self, raw: bytes) -> None:
         """Send bytes as they are."""
         self._time_left()
-        self.transcript.append(Sent(self._clock(), raw))
+        self.transcript.entries.append(Sent(self._clock(), raw))
         self._sent_until = max(self._clock(), self._sent_until) + len(raw) * self._char_time
         if raw in (codec.ACK, codec.NAK):
             self._response = raw
@@ -211,8 +178,7 @@ class Wire:
 
     def has_passed_command(self, symbol: Symbol) -> bool:
         """If a symbol is a command that is not a copy of ours, acknowledge it and return True."""
-        if not codec.is_command(symbol) or any(
-                symbol.raw in entry.raw for entry in self.transcript if isinstance(entry, Sent)):
+        if not codec.is_command(symbol) or self.transcript.has_sent(symbol.raw):
             return False
         if not self._is_radio:
             self.send(codec.ACK)
@@ -221,31 +187,14 @@ class Wire:
     def _next(self, end: float) -> Symbol | None:
         if self._embedded:
             return self._embedded.popleft()
-        while True:
-            symbol = codec.next_symbol(self._buffer, self.check, self.is_half_duplex)
-            if symbol is not None:
-                return self._take(symbol)
-            # Wait for the end of a symbol that has begun, but not for ever.
-            longest = max(_FRAME_TIME, _LONGEST_FRAME * self._char_time)
-            limit = max(end, self._symbol_begun + longest) if self._buffer else end
-            left = limit - self._clock()
-            if left <= 0:
-                noise = Symbol(SymbolKind.NOISE, self._buffer)
-                return self._take(noise) if self._buffer else None
-            self._read(left)
+        symbol = self.reader.symbol(end)
+        return None if symbol is None else self._take(symbol)
 
-    def _read(self, timeout: float) -> None:
-        data = self._line.read(min(timeout, self._time_left()))
-        self.has_heard = self.has_heard or bool(data)
-        if not self._buffer:
-            self._symbol_begun = self._clock()
-        self._buffer = (self._buffer + data)[-_MOST_UNREAD:]
+    def _read(self, timeout: float) -> bytes:
+        return self._line.read(min(timeout, self._time_left()))
 
     def _take(self, symbol: Symbol) -> Symbol:
-        symbol = replace(symbol, at=self._clock())
-        self._buffer = self._buffer[len(symbol.raw):]
-        self._symbol_begun = symbol.at
-        self.transcript.append(symbol)
+        self.transcript.entries.append(symbol)
         if symbol.kind is SymbolKind.MESSAGE:
             self._response = codec.NAK  # until we send its response
             self._message_at = symbol.at
@@ -286,7 +235,7 @@ class Wire:
         """Wait, and keep incoming bytes for the next ``hear``."""
         end = self._clock() + seconds
         while (left := end - self._clock()) > 0:
-            self._read(left)
+            self.reader.wait(left)
 
     def drain(self, limit: float) -> None:
         """Receive and drop symbols until the line is quiet, at most ``limit`` s."""

@@ -93,7 +93,7 @@ def test_failures_skips_noise_and_early_enquiries_are_told(
     def results(cases: Sequence[Case], wire: Wire, end: AskingEnd,
                 allowed: frozenset[Permission]) -> Iterator[CaseResult]:
         assert (allowed, wire.answer_time, end.words) == (permissions, 1.5, words)
-        wire.noise, wire.enquired_after, wire.has_heard = 3, 1.78, True
+        wire.noise, wire.enquired_after, wire.reader.has_heard = 3, 1.78, True
         yield CaseResult(cases[0], Verdict.FAIL, 0.1, 'ACK', 'NAK', ('we   10 05',))
         yield CaseResult(cases[0], Verdict.SKIP, got='needs a word')
 

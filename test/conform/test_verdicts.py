@@ -308,7 +308,7 @@ def test_wait_for_a_symbol_ends_though_others_come_for_ever() -> None:
     assert (wire.hear(), wire.noise - noise, noise % 33_000) == (None, 65536, 0)
     with pytest.raises(Failed, match='got silence'):
         wire.expect(SymbolKind.ACK)
-    assert wire.has_heard
+    assert wire.reader.has_heard
     said = [codec.ACK, b'\x55']
     line.read = lambda timeout: said.pop()  # type: ignore[method-assign]
     assert wire.expect(SymbolKind.ACK).raw == codec.ACK
