@@ -90,8 +90,7 @@ def test_faults_are_found_by_the_cases_that_name_them_and_told_as_stored() -> No
     told = []
     for target, habit, name in FAULTS:
         end = ENDS[target]('CRC', habit)
-        for words in end.files:
-            words[:] = b'\7' * len(words)
+        end.words[:] = b'\7' * len(end.words)
         result, = results_of(end, target, 'CRC', only=name)
         told.append(f'{target.value} {habit.name} {name}: {result.verdict.value} after '
                     f'{result.seconds:.2f} s, {len(result.transcript)} symbols, expected '
@@ -99,7 +98,7 @@ def test_faults_are_found_by_the_cases_that_name_them_and_told_as_stored() -> No
         assert result.verdict is Verdict.FAIL, told[-1]
         assert target in ASKING or result.transcript[0].startswith('      0.0 ms we ')
         # the case has restored the words of the PLC
-        assert set().union(*end.files) <= {7}, told[-1]
+        assert set(end.words) <= {7}, told[-1]
     compare_stored(STORED / 'faults.txt', ''.join(told))
 
 
@@ -113,10 +112,9 @@ def test_words_are_restored_after_a_lack_of_time_and_a_late_or_partial_write(
         name: str, got: str, habits: list[Habit], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr('abdf1_ros.conform.case.LONGEST_CASE', 9.0)
     line = MutatedSlave('CRC', *habits)
-    for words in line.files:
-        words[:] = b'\7' * len(words)
+    line.words[:] = b'\7' * len(line.words)
     result, = results_of(line, Target.SLAVE, 'CRC', only=name)
-    assert (result.got, set().union(*line.files)) == (got, {7})
+    assert (result.got, set(line.words)) == (got, {7})
 
 
 def test_line_that_is_lost_before_words_are_restored_has_their_values_told() -> None:
@@ -184,7 +182,7 @@ def test_poll_of_station_16_is_to_be_read_doubled() -> None:
 def test_fault_of_a_plc5_is_found(habit: Habit, name: str) -> None:
     line = MutatedPeer('CRC', habit, family='PLC5')
     result, = results_of(line, Target.PEER, 'CRC', 'PLC5', only=name)
-    assert result.verdict is Verdict.FAIL and not set().union(*line.files) - {0}
+    assert result.verdict is Verdict.FAIL and set(line.words) == {0}
 
 
 @for_all('station', [7, 252, 253, 254])

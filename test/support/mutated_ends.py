@@ -16,20 +16,18 @@
 Ends of a line with habits that can be switched on: slave, peer, master, client, radio nodes.
 
 Without a habit each keeps the rules of the manual. A habit is a fault, or something that the
-manual allows. Bytes are made and read by a codec that is neither that of the package nor that of
-``conform``: a receiver takes them one at a time; the checks are those of the vectors' verifier.
-Time is virtual.
+manual allows. Neither codec nor PLC is that of the package, nor that of ``conform``: a
+receiver takes bytes one at a time; the checks are those of the vectors' verifier. Time is virtual.
 """
 
 from collections import deque
-from collections.abc import Callable, Collection, Generator
+from collections.abc import Callable, Generator
 from enum import Enum
 import heapq
 from itertools import count
 import runpy
 
-from abdf1_ros.df1.packet import Packet
-from support.driver_bench import simulated_plc
+from support.plain_plc import PlainPlc
 from support.vectors import VECTOR_FOLDER
 
 _VERIFY = runpy.run_path(str(VECTOR_FOLDER / 'verify.py'))
@@ -117,12 +115,12 @@ class Wire:
     """
     One end of a line in virtual time, as ``conform`` uses it.
 
-    What ``say`` is given leaves ``delay`` s later; ``after`` calls something then. ``files`` are
-    the words of a PLC behind it.
+    What ``say`` is given leaves ``delay`` s later; ``after`` calls something then. ``words`` are
+    those of a PLC behind it.
     """
 
     def __init__(self, check: str, habits: frozenset[Habit], is_half_duplex: bool) -> None:
-        self.files: Collection[bytearray] = ()
+        self.words = bytearray()
         self.check, self.habits, self.is_half_duplex = check, habits, is_half_duplex
         self.now = 0.0
         self._due: list[tuple[float, int, Callable[[], None]]] = []
@@ -297,10 +295,10 @@ class Wire:
 class _Executor:
     """A PLC behind an end: link data in, link data of the reply out; and what is a duplicate."""
 
-    def __init__(self, wire: Wire, station: int, family: str) -> None:
+    def __init__(self, wire: Wire, family: str) -> None:
         self._wire = wire
-        self._plc = simulated_plc(station, family, wire.clock, ('N7:0', 20), checksum=wire.check)
-        wire.files = self._plc.table.words.values()
+        self._plc = PlainPlc(family)
+        wire.words = self._plc.words
         self._seen: deque[bytes] = deque(maxlen=99 if wire.has(Habit.REMEMBERS_99) else 1)
         self._count = 0
         self._tns = 0x6000
@@ -344,11 +342,11 @@ class _Executor:
         data = self._misread(data)
         if cmd == 0x0F and fnc == b'\x68' and data[11:12] == b'\x07' and has(Habit.REFUSES_AREA):
             return self._done(data, sts=0x10)
-        reply = self._plc.serve(Packet.decode(data)).encode()
+        reply = self._plc.serve(data)
         if fnc == b'\xAB' and has(Habit.MASK_CHANGES_NEXT_WORD):
             element = bytes((data[10] + 1,))
-            self._plc.serve(Packet.decode(
-                data[:6] + b'\xAA\x02' + data[8:10] + element + b'\0' + b'\x99\x99'))
+            self._plc.serve(
+                data[:6] + b'\xAA\x02' + data[8:10] + element + b'\0\x99\x99')
         if fnc == b'\xA2' and has(Habit.WORDS_REVERSED):
             reply = reply[:6] + _reversed(reply[6:])
         if has(Habit.ALWAYS_STS) or fnc == b'\xAB' and has(Habit.REFUSES_MASK):
@@ -418,7 +416,7 @@ class MutatedSlave(Wire):
     def __init__(self, check: str, *habits: Habit, station: int = 1, family: str = 'SLC') -> None:
         super().__init__(check, frozenset(habits), is_half_duplex=True)
         self._station = station
-        self._plc = _Executor(self, station, family)
+        self._plc = _Executor(self, family)
         self._queue: deque[tuple[float, bytes]] = deque()
         self._held: bytes | None = None
         self._sent = 0
@@ -652,7 +650,7 @@ class MutatedPeer(_FullDuplex):
 
     def __init__(self, check: str, *habits: Habit, station: int = 1, family: str = 'SLC') -> None:
         super().__init__(check, frozenset(habits))
-        self._plc = _Executor(self, station, family)
+        self._plc = _Executor(self, family)
         if self.has(Habit.SENDS_COMMANDS):
             self.after(0.7, self._ask)
 
@@ -814,7 +812,7 @@ class MutatedRadioNode(_Radio):
     def __init__(self, check: str, *habits: Habit, station: int = 1, family: str = 'SLC') -> None:
         super().__init__(check, frozenset(habits))
         self.own_number = station
-        self._plc = _Executor(self, station, family)
+        self._plc = _Executor(self, family)
         self._replies: dict[bytes, bytes] = {}
         self._executed = 0
 
