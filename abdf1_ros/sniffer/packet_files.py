@@ -15,12 +15,14 @@
 """
 Packets of files that Wireshark and tcpdump write: pcap and pcapng.
 
-The formats follow draft-ietf-opsawg-pcap and draft-ietf-opsawg-pcapng, sections 4.1 to 4.4.
+The formats follow draft-ietf-opsawg-pcap and draft-ietf-opsawg-pcapng, sections 4.1 to 4.4. Dumps
+of packets as text are only found, because such texts leave out the kind of link.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+import re
 import struct
 from typing import BinaryIO, NamedTuple
 
@@ -35,6 +37,15 @@ _INTERFACE, _SIMPLE, _ENHANCED = 1, 3, 6
 _RESOLUTION = 9  # option of an interface
 _LONGEST = 1_000_000  # bytes of a packet or block; no network has longer packets
 
+# A line of "tshark -x" or "tcpdump -X": the offset in its packet, and bytes.
+_DUMPED = re.compile(r'\s*(?:0[xX])?([0-9A-Fa-f]{4,8}):?\s+((?:[0-9A-Fa-f]{2}\s{0,2})+)')
+# What stands before an IPv4 header on the usual links, and where: Ethernet with two tags at most,
+# cooked 1 and 2, loopback, nothing.
+_HEADS = {14: (12, b'\x08\0'), 16: (14, b'\x08\0'), 18: (16, b'\x08\0'), 22: (20, b'\x08\0'),
+          20: (0, b'\x08\0'), 4: (0, b'\2\0\0\0'), 0: (0, b'')}
+_LONGEST_HEAD = 22 + 60  # bytes, with IPv4
+_PROTOCOLS = (1, 6, 17)  # ICMP, TCP, UDP
+
 
 class RecordedPacket(NamedTuple):
     """A packet: seconds since 1970 (None: not recorded), link type, and the recorded bytes."""
@@ -47,6 +58,28 @@ class RecordedPacket(NamedTuple):
 def is_packet_file(start: bytes) -> bool:
     """Return True if a file that begins with these bytes is pcap or pcapng."""
     return start[:4] == _PCAPNG or start[:4] in _PCAP
+
+
+def shows_packets(lines: Iterable[str]) -> bool:
+    """Return True if a text shows the bytes of whole packets, with their IPv4 headers."""
+    packet = b''
+    for match in filter(None, map(_DUMPED.match, lines)):
+        offset = int(match[1], 16)
+        packet = packet[:offset] + bytes.fromhex(match[2])
+        if offset < _LONGEST_HEAD and any(
+                packet.startswith(mark, at) and _is_ip(packet[size:], bool(mark))
+                for size, (at, mark) in _HEADS.items()):
+            return True
+    return False
+
+
+def _is_ip(data: bytes, may_lack_check: bool) -> bool:
+    """Return True if bytes begin with an IPv4 header; a network card may add its check later."""
+    size = 4 * (data[0] & 0x0F) if data else 0
+    if size < 20 or len(data) < size or data[0] >> 4 != 4 or data[9] not in _PROTOCOLS:
+        return False
+    total = sum(struct.unpack_from(f'>{size // 2}H', data))
+    return total % 0xFFFF == 0 or may_lack_check and data[10:12] == b'\0\0'
 
 
 class PacketFile:

@@ -47,6 +47,7 @@ from abdf1_ros.sniffer.layouts import (
 )
 from abdf1_ros.sniffer.marks import GLUED, kind_of, MARK, Marks, marks_of, TextClock, way_of, WORD
 from abdf1_ros.sniffer.notations import DIGITS, HAS_NAMES, HEX, NAMES, Notation, NOTATIONS
+from abdf1_ros.sniffer.packet_files import shows_packets
 from abdf1_ros.sniffer.tables import tables
 from abdf1_ros.sniffer.traffic import TrafficDecoder
 from abdf1_ros.text import first, shown
@@ -57,6 +58,10 @@ _ENOUGH = 0.5  # share of good bytes with which less likely notations are not tr
 _SURE = 0.999
 _CHANCE = 0.05  # share of good bytes that noise may have
 _MANY = 32  # bytes that prove a notation although no frame is good
+
+_PACKETS = ('this shows whole packets with their IP headers, not the bytes of a line: record with '
+            '"tshark -w" or "tcpdump -w", and give that file; text2pcap makes such a file from '
+            'the text of "tshark -x"')
 
 _COMMENT = re.compile(r'#(?!\d)|//')
 
@@ -214,6 +219,8 @@ class TextReader:
                 break
         if not any(line.strip() for _, line in sample):
             return
+        if shows_packets(line for _, line in sample):
+            raise TextProblem(self._name, _PACKETS)
         try:
             best = _best([(number, _begin(line)) for number, line in sample])
         except _Stop as stop:

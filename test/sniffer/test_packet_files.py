@@ -14,7 +14,7 @@
 
 """pcap and pcapng: our own, PCCC in EtherNet/IP, and files that are damaged."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 import gzip
 import os
 from pathlib import Path
@@ -365,6 +365,51 @@ def test_port_of_a_device_server_is_given_or_asked_for(tmp_path: Path) -> None:
         list(Recording(path).chunks())
     assert list(Recording(path, servers=frozenset((950,))).chunks()) == [
         Chunk(0.0, Direction.OUT, POLL)]
+
+
+def tshark_x(packet: bytes) -> list[str]:
+    return [f'{at:04x}  {packet[at:at + 16].hex(" "):<47}   {characters(packet[at:at + 16])}'
+            for at in range(0, len(packet), 16)]
+
+
+def tcpdump_upper_x(packet: bytes) -> list[str]:
+    return [f'\t0x{at:04x}:  {packet[at:at + 16].hex(" ", -2):<39}  '
+            f'{characters(packet[at:at + 16])}' for at in range(0, len(packet), 16)]
+
+
+def tcpdump_x(packet: bytes) -> list[str]:
+    return [line[:49].rstrip() for line in tcpdump_upper_x(packet)]
+
+
+def characters(data: bytes) -> str:
+    return ''.join(chr(byte) if 32 <= byte < 127 else '.' for byte in data)
+
+
+# A poll to 192.168.1.20:4001; the sum of its header was computed by hand.
+IP = bytes.fromhex('4500 002C 0001 4000 4006 B75C C0A8010A C0A80114'
+                   'C350 0FA1 000003E8 00001388 5018 0200 0000 0000 100501FF')
+LINKS = {'Ethernet': bytes(12) + b'\x08\0', 'a tag': bytes(12) + b'\x81\0\0\7\x08\0',
+         'cooked': bytes(14) + b'\x08\0', 'loopback': b'\2\0\0\0'}
+
+
+@for_all('dump', [tshark_x, tcpdump_x, tcpdump_upper_x])
+def test_text_of_whole_packets_is_refused_with_the_way_out(
+        tmp_path: Path, dump: Callable[[bytes], list[str]]) -> None:
+    """Otherwise IP headers would be noise, and the answers would lack their directions."""
+    head = '14:05:09.120000 IP 192.168.1.10.50000 > 192.168.1.20.4001: Flags [P.], length 4'
+    for packet in (IP, *(link + IP for link in LINKS.values()),
+                   LINKS['Ethernet'] + IP[:10] + bytes(2) + IP[12:]):  # the card adds the sum
+        text = '\n'.join([*dump(bytes(12) + b'\x08\x06' + bytes(28)), head, *dump(packet), ''])
+        with pytest.raises(Problem, match='whole packets .* "tshark -w" .* text2pcap'):
+            chunks_of(tmp_path / 'x', text.encode())
+
+
+@for_all('wire', [
+    IP[:12], IP[1:], bytes.fromhex('1002 0001 4F00 3412 0100 0000 0006 0000 0000') + bytes(60),
+    bytes.fromhex('1002 0001 4600 3412 0800 0000 0006 0000') + bytes(60)])
+def test_dump_of_a_line_is_not_taken_for_packets(tmp_path: Path, wire: bytes) -> None:
+    found = chunks_of(tmp_path / 'x', '\n'.join(tshark_x(wire)).encode())
+    assert b''.join(chunk.data for chunk in found) == wire
 
 
 def test_two_device_servers_are_two_lines(tmp_path: Path) -> None:
