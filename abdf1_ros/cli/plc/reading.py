@@ -64,6 +64,44 @@ class WatchedRead(NamedTuple):
     what: Values | NoValue
 
 
+class NewReads:
+    """
+    The results that the thread of the link has, on their way to the thread that shows them.
+
+    At most MAX_NEWS wait. The thread of the link calls ``add``, and sets ``wake`` if there is
+    something else to show.
+    """
+
+    def __init__(self) -> None:
+        self._waiting: deque[WatchedRead] = deque(maxlen=MAX_NEWS)
+        self._taken: list[WatchedRead] = []  # that may not have been shown to the end
+        self._lost = self._lost_reported = 0
+        self.wake = Wake()  # not an Event: an interrupt in it may leave its lock locked
+
+    def add(self, mapping: Mapping, what: Values | NoValue) -> None:
+        """Add a result of this moment; if too many wait, the oldest is dropped."""
+        self._lost += len(self._waiting) == MAX_NEWS
+        self._waiting.append(WatchedRead(datetime.now().astimezone(), mapping, what))
+        self.wake.set()
+
+    def wait(self, milliseconds: int) -> None:
+        """Wait until ``wake`` is set, but at most for this time."""
+        self.wake.wait(milliseconds)
+        self.wake.take()
+
+    def hand_over(self, show: Callable[[Sequence[WatchedRead], int], None]) -> None:
+        """
+        Call ``show`` with the results, and with the number of those dropped since the last call.
+
+        If ``show`` raises an exception, it gets the same results again.
+        """
+        while self._waiting:
+            self._taken.append(self._waiting.popleft())
+        lost, self._lost_reported = self._lost - self._lost_reported, self._lost
+        show(self._taken, lost)
+        self._taken = []
+
+
 class RepeatedReads:
     """
     Read ``mappings`` every ``period`` seconds; ``show`` of a subclass gets the results.
@@ -99,10 +137,7 @@ class RepeatedReads:
                                        network.duplex, port, partial(tell, 'plc'))
         self._link = LinkThread(self._driver.machine, port, while_sending=self._note_failures,
                                 longest_wait=_LONGEST_WAIT)
-        self._news: deque[WatchedRead] = deque(maxlen=MAX_NEWS)
-        self._taken: list[WatchedRead] = []  # that ``show`` may not have shown to the end
-        self._lost = self._lost_reported = 0
-        self._has_news = Wake()  # not an Event: an interrupt in it may leave its lock locked
+        self._news = NewReads()
         self._reads: Counter[Mapping] = Counter()
         self._failures = 0  # of all points, as far as they are noted
         self._noted: dict[Mapping, str] = {}
@@ -117,20 +152,19 @@ class RepeatedReads:
             self.begin()
             self._link.start()  # inside the try block: the thread would keep the process alive
             while not self._link.has_failed and not self._is_done(count):
-                self._has_news.wait(_GLANCE)
-                self._has_news.take()
-                self._show_news()
-            self._show_news()
+                self._news.wait(_GLANCE)
+                self._news.hand_over(self.show)
+            self._news.hand_over(self.show)
             self.silent = self._first_silent()
         except KeyboardInterrupt:
-            self._show_news()
+            self._news.hand_over(self.show)
         finally:
             # Count before the stop, because the end of the line causes more errors.
             failed = sum(point.error is not None for point in self._points)
             self._echoes = self._driver.machine.echoes
             self._link.stop()
             self._port.close()  # the thread may not have come to it
-            self._has_news.close()
+            self._news.wake.close()
             if self._trace is not None:
                 self._trace.close()
         return failed
@@ -158,7 +192,7 @@ class RepeatedReads:
         """Record the values of a read; called in the link thread."""
         self._noted.pop(mapping, None)
         self._reads[mapping] += 1
-        self._note(mapping, values)
+        self._news.add(mapping, values)
 
     def unreadable(self, *args: object) -> None:
         """Do nothing: the point has the reason, and no other event can happen here."""
@@ -167,12 +201,7 @@ class RepeatedReads:
 
     def station_changed(self, station: Station) -> None:
         """Wake the thread that shows the news."""
-        self._has_news.set()
-
-    def _note(self, mapping: Mapping, what: Values | NoValue) -> None:
-        self._lost += len(self._news) == MAX_NEWS
-        self._news.append(WatchedRead(datetime.now().astimezone(), mapping, what))
-        self._has_news.set()
+        self._news.wake.set()
 
     def _note_failures(self) -> None:
         """Record the reads that have failed since the last call; called in the link thread."""
@@ -188,7 +217,7 @@ class RepeatedReads:
     def _note_gap(self, mapping: Mapping, reason: str | None) -> None:
         if reason is not None and self._noted.get(mapping) != reason:
             self._noted[mapping] = reason
-            self._note(mapping, NoValue(reason))
+            self._news.add(mapping, NoValue(reason))
 
     def _note_unheard(self) -> None:
         """Record the rows that no other node reads any more."""
@@ -202,10 +231,3 @@ class RepeatedReads:
             return False
         return all(self._reads[point.mapping] + point.failures >= count
                    for point in self._points)
-
-    def _show_news(self) -> None:
-        while self._news:
-            self._taken.append(self._news.popleft())
-        lost, self._lost_reported = self._lost - self._lost_reported, self._lost
-        self.show(self._taken, lost)
-        self._taken = []

@@ -33,7 +33,7 @@ from abdf1_ros.cli.plc.command import main
 from abdf1_ros.cli.plc.data import mapping_of
 from abdf1_ros.cli.plc.log import ValueLog
 from abdf1_ros.cli.plc.log_file import Cell, FORMS, LogFile, LogLost, LogOutput, LogRow
-from abdf1_ros.cli.plc.reading import WatchedRead
+from abdf1_ros.cli.plc.reading import NewReads, WatchedRead
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.packet import Packet
@@ -273,9 +273,10 @@ def test_reads_that_were_lost_and_a_pause_of_the_host_are_rows(
     monkeypatch.setattr('abdf1_ros.cli.plc.reading.MAX_NEWS', 2)
     kept, speed = Kept(), mapping_of('N7:0', SLC)
     log = ValueLog(network_on(plcs), [speed], 0.01, kept)
+    news = NewReads()
     for value in range(5):
-        log.read(speed, array('h', [value]))
-    log._show_news()  # noqa: SLF001
+        news.add(speed, array('h', [value]))
+    news.hand_over(log.show)
     assert kept.told == [('', '', '3 reads lost: this output was too slow'),
                          ('N7:0', '3', ''), ('N7:0', '4', '')]
     later = datetime.now().astimezone() + timedelta(hours=2)

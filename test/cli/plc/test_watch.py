@@ -28,7 +28,7 @@ import re
 import threading
 
 from abdf1_ros.cli.plc.data import mapping_of, Radix, Tags
-from abdf1_ros.cli.plc.reading import NoValue, WatchedRead
+from abdf1_ros.cli.plc.reading import NewReads, NoValue, WatchedRead
 from abdf1_ros.cli.plc.watch import curve_of, LiveValues
 from abdf1_ros.driver.checks import Checks, StationHealth
 from abdf1_ros.pccc.file_types import PlcType
@@ -100,10 +100,10 @@ def test_what_stays_is_shown_once(plcs: Plcs, capsys: Output) -> None:
 def test_reads_that_the_output_does_not_take_are_counted(
         plcs: Plcs, capsys: Output, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr('abdf1_ros.cli.plc.reading.MAX_NEWS', 2)
-    watch = LiveValues(network_on(plcs), [SPEED], 0.01)
+    news = NewReads()
     for value in range(5):
-        watch.read(SPEED, array('h', [value]))
-    watch.show([], 3)
+        news.add(SPEED, array('h', [value]))
+    news.hand_over(LiveValues(network_on(plcs), [SPEED], 0.01).show)
     assert capsys.readouterr().err == 'plc: 3 reads lost: this output was too slow\n'
 
 
