@@ -40,10 +40,10 @@ import math
 from typing import NamedTuple, Protocol
 
 from abdf1_ros.counters import Counters
-from abdf1_ros.df1.accounting import count_unheard
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import Control, Duplex, Frame, FrameDecoder, MAX_LINK_DATA, NOISE, Symbol
+from abdf1_ros.df1.frames import Control, Duplex, Frame, Symbol
 from abdf1_ros.df1.packet import begins_good_reply, HEADER_SIZE
+from abdf1_ros.df1.receiver import Receiver
 from abdf1_ros.df1.sender import Outlet, Reflex, Sender
 from abdf1_ros.errors import CommandExpired
 
@@ -144,27 +144,12 @@ LONGEST_REST = 1.0
 # the beginning of a connection to a device server.
 OLD = 0.5
 
-# Longest time (s) that an operating system or a device server holds bytes of a frame back.
-HELD_BACK = 0.1
-
-# Pause, in characters, after which a message has ended or a line is quiet. The time that the
-# equipment may hold bytes back is added.
-QUIET_CHARACTERS = 20
-
 # A shorter time (s) counts as 0, because no wait is more exact.
 MOMENT = 0.0001
-
-# A message that has begun may take _SLOWEST times the time of its bytes at the set speed, but at
-# most the time of _LONGEST characters. Two pauses are added. Without these limits, a station that
-# sends very slowly, or never stops, would block the line for all other stations.
-_SLOWEST = 4
-_LONGEST = 2 * MAX_LINK_DATA
 
 # Most characters that a UART passes on together. The last characters of a reply are read as they
 # come.
 _LAST_CHARACTERS = 16
-
-_XON, _XOFF = b'\x11', b'\x13'
 
 # Responses: a full-duplex node sends them only after it has heard a message or an ENQ to its end.
 _RESPONSES = (Control.ACK, Control.NAK)
@@ -191,20 +176,6 @@ class LineTiming:
     tx_delay: float = 0.0
 
 
-class _Incoming(NamedTuple):
-    """
-    The message that is coming in; ``number`` counts all messages up to it.
-
-    ``begun`` is when its first bytes came (clock value in s). ``heard`` counts all bytes that had
-    come from the line by then. ``is_in_time`` tells whether the message began before the deadline.
-    """
-
-    number: int = 0
-    begun: float = 0.0
-    heard: int = 0
-    is_in_time: bool = False
-
-
 class Background(Protocol):
     """Work to do when it is due, even if the line is busy, and when the procedure ends."""
 
@@ -228,11 +199,10 @@ class Machine:
     even while the line is busy. After a pause of this process that is longer than
     ``senders_patience`` (s), a message ``may_be_old``; infinite where ``serve`` judges its age.
 
-    ``flow_controls`` is how many bytes 11 and 13 hex came, which software flow control swallows.
-    ``is_behind`` is set while bytes have come that ``receive_data`` is still to be given.
-    ``sender`` has the bytes to send. ``late`` is the sum of the seconds by which calls came more
-    than MOST_LATE after a deadline of the procedure. In this time the process, or its host, did
-    not run.
+    ``sender`` has the bytes to send, ``receiver`` those that came. ``is_behind`` is set while
+    bytes have come that ``receive_data`` is still to be given. ``late`` is the sum of the seconds
+    by which calls came more than MOST_LATE after a deadline of the procedure. In this time the
+    process, or its host, did not run.
     """
 
     def __init__(self, procedure: Callable[[Machine], Procedure], *, checksum: Checksum,
@@ -240,15 +210,14 @@ class Machine:
                  counters: Counters | None = None, forget_on_send: bool = False,
                  background: Background | None = None,
                  senders_patience: float = _PATIENCE_OF_SENDERS) -> None:
-        self._checksum = checksum
-        self.decoder = FrameDecoder(checksum, duplex)
         self.counters = counters or Counters()
         self.timing = timing or LineTiming()
         self.sender = Sender(checksum, duplex, self.timing.char_time, self.counters)
+        self.receiver = Receiver(self.sender, checksum, duplex, self.timing.char_time,
+                                 self.counters, is_master=forget_on_send)
         self.now = 0.0
         self.deadline: float | None = None
         self.late = 0.0
-        self.flow_controls = 0
         self.is_behind = False
         # of the last pauses, the end and the seconds
         self._pauses = deque[tuple[float, float]](maxlen=_MOST_PAUSES)
@@ -256,15 +225,12 @@ class Machine:
         self._senders_patience = senders_patience
         self._background = background
         self._make_procedure = procedure
-        self._pause_limit = QUIET_CHARACTERS * self.timing.char_time + HELD_BACK  # inside a frame
         self._forget_on_send = forget_on_send
         self._is_half_duplex = duplex is Duplex.HALF
         self._procedure: Procedure | None = None
         self._step: Step = Rest()
         self._is_listening = False
-        self._last_heard = -math.inf
         self._due = -math.inf  # the deadline, before a message was heard out
-        self._message = _Incoming()
 
     @property
     def next_call(self) -> float | None:
@@ -273,7 +239,7 @@ class Machine:
         for moment in (self.deadline, self.sender.outgoing.due):
             if moment is not None and moment < first:
                 first = moment
-        if self.decoder.in_message:
+        if self.receiver.decoder.in_message:
             first = min(first, self._message_end())
         return None if first == math.inf else first
 
@@ -288,22 +254,6 @@ class Machine:
         return self.now < self._old_until
 
     @property
-    def message_begun(self) -> float:
-        """Return when the last message began to come in; ``now`` if it came in one piece."""
-        is_known = self._message.number == self.decoder.begun
-        return self._message.begun if is_known else self.now
-
-    @property
-    def hears_until(self) -> float:
-        """Return until when to hear the message that has begun (clock value in s), or -inf."""
-        if not self.decoder.in_message:
-            return -math.inf
-        heard = self.counters.chars_received - self._message.heard
-        characters = min(_SLOWEST * heard, _LONGEST)
-        return min(self._last_heard + self._pause_limit, self._message.begun
-                   + 2 * self._pause_limit + characters * self.timing.char_time)
-
-    @property
     def spare_time(self) -> float:
         """
         Return for how long (s) incoming bytes need not be read, because a long reply is coming in.
@@ -311,10 +261,10 @@ class Machine:
         One read of the whole reply avoids most of the wake-ups for single bytes. The read comes
         well before the deadline, because only bytes that have been read postpone it.
         """
-        step, char_time = self._step, self.timing.char_time
-        if not isinstance(step, Send) or not step.reply_size or not self.decoder.in_message:
+        step, char_time, decoder = self._step, self.timing.char_time, self.receiver.decoder
+        if not isinstance(step, Send) or not step.reply_size or not decoder.in_message:
             return 0.0
-        data = self.decoder.link_data
+        data = decoder.link_data
         is_faster = self.now - self.sender.free_at < len(data) * char_time
         if is_faster or not begins_good_reply(data):
             return 0.0  # faster than its speed (a simulator's line), or not a good reply
@@ -344,7 +294,7 @@ class Machine:
         self.now = now
         procedure, self._procedure = self._procedure, None
         self.sender.clear()
-        self.decoder.reset()
+        self.receiver.decoder.reset()
         self.deadline, self._is_listening = None, False
         if procedure is None:
             return
@@ -363,60 +313,36 @@ class Machine:
     def receive_data(self, data: bytes, now: float) -> None:
         """Take bytes from the line."""
         self.now = now
-        self.counters.chars_received += len(data)
-        self.flow_controls += data.count(_XON) + data.count(_XOFF)
+        receiver, decoder = self.receiver, self.receiver.decoder
+        receiver.count(data)
         if self._forget_on_send and (self.sender.waiting or not self._is_listening):
-            self._count(data)
+            if not self.sender.waiting:
+                receiver.count_unheard(data)
             return  # these bytes came before our command left, so they cannot answer it
-        if self._is_listening and now - self._last_heard > self._pause_limit:
-            if not self.decoder.in_message:
-                self.decoder.reset()  # a symbol that broke off must not swallow the next one
+        if self._is_listening and now > receiver.quiet_at:
+            if not decoder.in_message:
+                decoder.reset()  # a symbol that broke off must not swallow the next one
             elif now > self._message_end():
-                self._break_off()
-        self._last_heard = now
-        self.decoder.feed(data)
+                self._resume(receiver.broken_off())
+        receiver.last_heard = now
+        decoder.feed(data)
         self._deliver_symbols()
-        if self.decoder.in_message:
-            self._hear_out(now)
+        # A message that began in time, and is not too slow, is heard to its end.
+        if receiver.began_in_time(now, self._due) and self._is_listening \
+                and self.deadline is not None and not isinstance(self._step, Rest):
+            self.deadline = max(self.deadline, receiver.hears_until)
 
     def drop(self, count: int, now: float) -> None:
         """Record bytes from the line that came too fast to be of use; the next may be old."""
         self.now = now
-        self.counters.chars_received += count
-        self.decoder.noise += count
-        self.decoder.reset()
+        self.receiver.drop(count)
         if self._senders_patience < math.inf:
             self.treat_as_old()
-
-    def _count(self, data: bytes) -> None:
-        """Count the symbols that come while a master does not listen."""
-        if self.sender.waiting:
-            return
-        self.decoder.feed(data)
-        while (symbol := self._next_symbol()) is not None:
-            count_unheard(symbol, self._checksum, self.counters)
 
     def _message_end(self) -> float:
         """Return when a message that stops is over, infinite while an answer is waited for."""
         is_idle = self.deadline is None or isinstance(self._step, Rest)
-        return self._last_heard + self._pause_limit if is_idle and self._is_listening \
-            else math.inf
-
-    def _break_off(self) -> None:
-        """Deliver a message that has stopped, as broken off."""
-        message = self.decoder.broken_off()
-        self.decoder.reset()
-        self._resume(message)
-
-    def _hear_out(self, now: float) -> None:
-        """Postpone the deadline to the end of a message that began in time and is not too slow."""
-        heard = self.counters.chars_received
-        if self._message.number != self.decoder.begun:
-            self._message = _Incoming(self.decoder.begun, now, heard, now <= self._due)
-        if self.deadline is None or isinstance(self._step, Rest) or not self._message.is_in_time \
-                or not self._is_listening:
-            return
-        self.deadline = max(self.deadline, self.hears_until)
+        return self.receiver.quiet_at if is_idle and self._is_listening else math.inf
 
     def handle_timeout(self, now: float) -> None:
         """Do what is due when the clock reads ``now``; nothing before ``next_call``."""
@@ -428,8 +354,9 @@ class Machine:
         due = self.sender.outgoing.due
         if due is not None and now >= due:
             self.sender.next_portion(now)
-        if self.decoder.in_message and now >= self._message_end():
-            self._break_off()
+        receiver, decoder = self.receiver, self.receiver.decoder
+        if decoder.in_message and now >= self._message_end():
+            self._resume(receiver.broken_off())
         if self.deadline is None or now < self.deadline:
             if has_expired:  # what waited for it may go out now
                 self._end_rest()
@@ -438,8 +365,8 @@ class Machine:
         if isinstance(step, Send) and not self._is_listening:  # its delay is over
             self._transmit(step)
         else:
-            decoder = self.decoder
-            self._resume(Silence(decoder.last_byte, decoder.in_message, now - self._last_heard))
+            self._resume(
+                Silence(decoder.last_byte, decoder.in_message, now - receiver.last_heard))
         self._deliver_symbols()
 
     def _note_pause(self, now: float, seconds: float) -> None:
@@ -489,30 +416,10 @@ class Machine:
             self._resume(_NOTHING, CommandExpired())
             self._deliver_symbols()
 
-    def _next_symbol(self) -> Symbol | None:
-        """
-        Return the next symbol of another node, None if more bytes are needed.
-
-        In full duplex the echo of our message is treated as noise: noise clears the last response
-        (M 4-8). If the message was from a PLC after all, this PLC then repeats it.
-        """
-        echo = self.sender.echo
-        while (symbol := self.decoder.next_symbol()) is not None:
-            # A frame without a station number is from a slave, because a master sends none. Until
-            # an echo has been heard, a control symbol is from a slave, too.
-            is_slaves = self._forget_on_send and (
-                symbol.station is None if isinstance(symbol, Frame)
-                else isinstance(symbol, Control) and not echo.is_heard)
-            if is_slaves or not echo.take_ours(symbol, self.sender.has_left):
-                break
-            if isinstance(symbol, Frame) and not self._is_half_duplex:
-                return NOISE
-        return symbol
-
     def _deliver_symbols(self) -> None:
-        sender = self.sender
-        while self._is_listening and self.decoder.waiting \
-                and (symbol := self._next_symbol()) is not None:
+        sender, receiver = self.sender, self.receiver
+        while self._is_listening and receiver.decoder.waiting \
+                and (symbol := receiver.next_symbol()) is not None:
             if self._step.reflex is not None and not self.timing.tx_delay:
                 sender.react(self._step.reflex, symbol)
             if self._is_half_duplex:  # a symbol came, so our bytes have left
@@ -543,7 +450,7 @@ class Machine:
             elif not self._wait(step):
                 return
             else:
-                heard = self._next_symbol() or _NOTHING
+                heard = self.receiver.next_symbol() or _NOTHING
 
     def _wait(self, step: Listen | Rest) -> bool:
         """Begin to wait; return True if the step does not wait."""
@@ -571,7 +478,7 @@ class Machine:
         self._is_listening = True
         sender.put(step.frame, self.now, step.expires)
         if self._forget_on_send:
-            self.decoder.reset()
+            self.receiver.decoder.reset()
         self._due = sender.free_at + (step.timeout or 0.0)
         self.deadline = None if step.timeout is None else self._due
         if step.timeout != 0:

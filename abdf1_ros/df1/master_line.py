@@ -271,7 +271,7 @@ class MasterLine:
                 if not symbol.is_misplaced:
                     self.note(Message.NTC_INVALID_SYMBOL, symbol.byte, station=number)
         if symbol.is_broken_off:
-            return self.machine.decoder.broken_off()
+            return self.machine.receiver.decoder.broken_off()
         self._last_code = self._last_code or symbol.last_byte
         return symbol
 

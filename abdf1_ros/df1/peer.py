@@ -415,7 +415,7 @@ class FullDuplexPeer(EqualNode):
 
     def _take_reply(self, packet: Packet) -> None:
         """Give a reply to its command, if the command still waits."""
-        self._expire(self._machine.message_begun)
+        self._expire(self._machine.receiver.message_begun(self._machine.now))
         self._accounting.received(packet)
         key = packet.src, packet.tns
         entry = self._outstanding.get(key)
@@ -431,9 +431,9 @@ class FullDuplexPeer(EqualNode):
 
     def _given_up(self, entry: Outstanding) -> float:
         """Return when a reply is overdue; a reply that began in time is heard to its end."""
-        machine = self._machine
-        is_in_time = machine.message_begun <= entry.deadline
-        return max(entry.deadline, machine.hears_until) if is_in_time else entry.deadline
+        receiver = self._machine.receiver
+        is_in_time = receiver.message_begun(self._machine.now) <= entry.deadline
+        return max(entry.deadline, receiver.hears_until) if is_in_time else entry.deadline
 
     def _expire(self, begun: float | None = None) -> None:
         """End the commands whose reply is overdue now, or at ``begun`` (S0, counter 2545)."""

@@ -44,14 +44,12 @@ from abdf1_ros.df1.frames import Duplex, Frame, MAX_LINK_DATA
 from abdf1_ros.df1.link import EqualNode, LinkState
 from abdf1_ros.df1.machine import (
     Heard,
-    HELD_BACK,
     Listen,
     LONGEST_REST,
     Machine,
     MIN_RESPONSE_TIME,
     MOMENT,
     Procedure,
-    QUIET_CHARACTERS,
     Rest,
     Send,
     Silence,
@@ -59,6 +57,7 @@ from abdf1_ros.df1.machine import (
 )
 from abdf1_ros.df1.mode import LineMode
 from abdf1_ros.df1.packet import BROADCAST, is_local_status, Packet
+from abdf1_ros.df1.receiver import HELD_BACK, QUIET_CHARACTERS
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task, TaskSource

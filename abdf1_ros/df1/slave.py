@@ -287,7 +287,7 @@ def answer(machine: Machine, symbol: Symbol, handle: Callable[[Symbol], bytes],
         symbol, heard = heard, None
         if _wants_answer(symbol):
             heard = yield from _next_within(machine, machine.timing.tx_delay, look)
-            if heard is not None or machine.is_behind or machine.decoder.has_begun:
+            if heard is not None or machine.is_behind or machine.receiver.decoder.has_begun:
                 handle(NOISE)  # an ACK after it is not for our last message
                 continue
         if data := handle(symbol):

@@ -322,7 +322,7 @@ def test_reply_is_looked_at_well_before_its_deadline() -> None:
 def test_any_other_message_is_heard_as_it_comes(packet: Packet, reply_size: int) -> None:
     bench = Bench(Send(FRAME, 1.0, reply_size=reply_size), timing=LineTiming(char_time=0.01))
     bench.machine.receive_data(message_frame(packet.encode(), Checksum.CRC)[:20], 0.5)
-    assert bench.machine.decoder.in_message
+    assert bench.machine.receiver.decoder.in_message
     assert bench.machine.spare_time == 0.0
 
 

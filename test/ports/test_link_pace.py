@@ -196,7 +196,7 @@ def test_bytes_of_a_connection_are_read_as_they_come(
     thread.start()
     assert theirs.recv(5) == READY
     theirs.send(frame[:8])
-    wait_until(lambda: script.machine.decoder.in_message)
+    wait_until(lambda: script.machine.receiver.decoder.in_message)
     theirs.send(frame[8:])
     assert isinstance(script.next(), Frame)
     assert thread.pauses == [] and not ours.is_terminal

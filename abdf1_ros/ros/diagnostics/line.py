@@ -76,7 +76,7 @@ def _came(driver: Driver) -> _Came:
     counters = driver.counters
     replies = counters.replies_received
     return _Came(counters.commands_sent, counters.messages_received, counters.damaged_frames,
-                 driver.machine.flow_controls, replies,
+                 driver.machine.receiver.flow_controls, replies,
                  replies - driver.tasks.transactions - counters.stale_messages)
 
 

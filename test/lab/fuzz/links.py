@@ -151,7 +151,7 @@ class _Line:
                 packet = Packet.decode(symbol.data)
                 self._last = self._last if packet.is_reply else packet
         assert len(self._ears.waiting) == 0 and not self._ears.in_message
-        assert len(machine.decoder.waiting) <= MAX_WAITING
+        assert len(machine.receiver.decoder.waiting) <= MAX_WAITING
         assert not machine.sender.waiting
 
 

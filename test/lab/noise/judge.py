@@ -68,7 +68,7 @@ class Ear(FrameDecoder):
     def of(cls, machine: Machine, checksum: Checksum, duplex: Duplex, wire: Wire) -> Ear:
         """Give a machine that has not begun such an ear."""
         ear = cls(checksum, duplex, wire)
-        machine.decoder = ear
+        machine.receiver.decoder = ear
         return ear
 
     def next_symbol(self) -> Symbol | None:
