@@ -35,23 +35,18 @@ An ACK is not a reply. A command waits for its reply up to Cmd_Timeout after the
 commands may wait, up to ``max_outstanding``; a reply finds its command by station and TNS. A reply
 that overtakes its ACK counts as the ACK, too (M 4-13).
 
-A message is sent again when its sender has not understood our response (M 4-5). So a repetition
-comes within the time that the sender's retries take. If the sender has acknowledged our reply and
-has not asked again, a repetition comes within the time of one retry. A later message with the same
-TNS is a new message: some processors count from 0 after each power-up, and some programs always
-send 0. A sender whose last two commands had different TNS gets a little more time: AdvancedHMI
-repeats its commands 0.95 to 1.06 s later, also those that were acknowledged.
+A message may come again, and is then executed only once: see ``df1/duplicates.py``.
 """
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Generator, Sequence
-from dataclasses import dataclass
 import math
 
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.accounting import count_control, count_fault
+from abdf1_ros.df1.duplicates import DuplicateDetection
 from abdf1_ros.df1.frames import Code, Control, Duplex, Frame, FrameFault, Symbol, Unknown
 from abdf1_ros.df1.link import ack_on_reply, EqualNode
 from abdf1_ros.df1.machine import (
@@ -84,34 +79,10 @@ MAX_WAITING_REPLIES = 8
 # reply that overtook it.
 _LATE_RESPONSE = 0.1
 
-# The ACK time-out (s) and the number of ENQs in the default settings of the products.
-_ACK_TIMEOUT = 1.0
-_ENQ_LIMIT = 3
-
-# Longest delay (s) of a repetition after the ACK time-out of a sender that counts its commands.
-_LATE_REPETITION = 0.25
-
 _REFLEX = ack_on_reply()
 
 # Interval (s) at which a peer that waits for a response checks for overdue commands.
 _TICK = 0.25
-
-
-@dataclass(slots=True)
-class _Accepted:
-    """
-    The last message accepted: its key (M 4-4), and when (clock value in s) it came.
-
-    ``is_counted`` tells that the last command of its sender had another TNS, ``is_answered`` that
-    our reply to it has been acknowledged. ``may_come_again`` tells that its sender has asked for a
-    response again, or that we have sent a NAK.
-    """
-
-    key: tuple[int, int, int]
-    when: float
-    is_counted: bool
-    is_answered: bool = False
-    may_come_again: bool = False
 
 
 class FullDuplexPeer(EqualNode):
@@ -157,8 +128,7 @@ class FullDuplexPeer(EqualNode):
         self._outstanding: dict[tuple[int, int], Outstanding] = {}
         self._last_response = frames.NAK
         self._undelivered_by: Message | None = None  # what was wrong with the last response
-        self._accepted: _Accepted | None = None
-        self._last_command: Packet | None = None
+        self._duplicates = DuplicateDetection(self._settings)
         self._unused: Packet | None = None
 
     def _next_task(self, source: TaskSource) -> Task | None:
@@ -202,8 +172,7 @@ class FullDuplexPeer(EqualNode):
     def _send_reply(self, reply: Packet) -> Procedure:
         self._accounting.sent(reply)
         delivered = yield from self._transfer(reply, lambda: False, is_once=False)
-        if self._accepted is not None and self._accepted.key == reply.key_of_command:
-            self._accepted.is_answered = delivered is not None
+        self._duplicates.replied(reply, is_delivered=delivered is not None)
 
     def _transfer(self, packet: Packet, is_answered: Callable[[], bool],
                   is_once: bool, expires: float = math.inf, answer_within: float = math.inf
@@ -339,7 +308,7 @@ class FullDuplexPeer(EqualNode):
         if isinstance(symbol, Frame):
             return self._message(symbol)
         if symbol is Control.ENQ:
-            self._expect_repetition()
+            self._duplicates.expect_repetition()
             count_control(symbol, self._counters)
             return self._respond(self._last_response)
         count_control(symbol, self._counters)
@@ -372,7 +341,7 @@ class FullDuplexPeer(EqualNode):
         if not packet.is_sound or (self._machine.echoes and not packet.is_reply):
             self._accounting.wrong(packet, packet.src)
             return self._respond(frames.NAK)
-        if self._is_repetition(packet):
+        if self._duplicates.is_repetition(packet, self._machine.now):
             self._counters.duplicate_messages += 1
             self._note(Message.NTC_DUPLICATE_MSG_RCVD, packet.src, station=packet.src)
             return self._respond(frames.ACK)
@@ -382,36 +351,9 @@ class FullDuplexPeer(EqualNode):
         if not packet.is_reply and len(self.replies) >= MAX_WAITING_REPLIES:
             self._counters.refused_for_memory += 1
             return self._respond(frames.NAK)  # sink full: not remembered, so it may come again
-        self._accepted = _Accepted(
-            packet.duplicate_key, self._machine.now, self._is_counted(packet))
+        self._duplicates.accepted(packet, self._machine.now)
         self._unused = packet
         return self._respond(frames.ACK)
-
-    def _is_counted(self, packet: Packet) -> bool:
-        """Record a command; return True if the last command of its sender had another TNS."""
-        if packet.is_reply:
-            return False
-        last, self._last_command = self._last_command, packet
-        return last is not None and last.src == packet.src and last.tns != packet.tns
-
-    def _is_repetition(self, packet: Packet) -> bool:
-        """Tell whether this is a repetition of the last message (M 4-4, 4-8)."""
-        last, settings = self._accepted, self._settings
-        if last is None or last.key != packet.duplicate_key or not settings.duplicate_detection:
-            return False
-        # Most seconds that the far end needs for its retries. Of our settings and the default
-        # settings of the products, the larger value counts.
-        ack_timeout = max(_ACK_TIMEOUT, settings.timeout)
-        if last.is_answered and not last.may_come_again:
-            retry_time = ack_timeout + _LATE_REPETITION * last.is_counted
-        else:
-            retry_time = (max(_ENQ_LIMIT, settings.enq_retries) + 1) * ack_timeout
-        return self._machine.now - last.when < retry_time
-
-    def _expect_repetition(self) -> None:
-        """Record that the far end may send its last message again."""
-        if self._accepted is not None:
-            self._accepted.may_come_again = True
 
     def _take_reply(self, packet: Packet) -> None:
         """Give a reply to its command, if the command still waits."""
@@ -422,7 +364,7 @@ class FullDuplexPeer(EqualNode):
         if entry is None or not self._stations.answers(packet, entry.task.command, None):
             # for another node: our reply may follow with the same SRC, CMD and TNS
             if entry is not None:
-                self._accepted = None
+                self._duplicates.forget_message()
             self._accounting.unexpected(packet, self._machine.now)
             return
         del self._outstanding[key]
@@ -452,7 +394,7 @@ class FullDuplexPeer(EqualNode):
     def _respond(self, response: bytes) -> bytes:
         self._last_response = response
         if response == frames.NAK:
-            self._expect_repetition()
+            self._duplicates.expect_repetition()
             self._counters.naks_sent += 1
         else:
             self._counters.acks_sent += 1
