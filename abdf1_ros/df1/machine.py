@@ -151,6 +151,8 @@ MOMENT = 0.0001
 # come.
 _LAST_CHARACTERS = 16
 
+_XON, _XOFF = b'\x11', b'\x13'
+
 # Responses: a full-duplex node sends them only after it has heard a message or an ENQ to its end.
 _RESPONSES = (Control.ACK, Control.NAK)
 
@@ -314,12 +316,13 @@ class Machine:
         """Take bytes from the line."""
         self.now = now
         receiver, decoder = self.receiver, self.receiver.decoder
-        receiver.count(data)
+        self.counters.chars_received += len(data)
+        receiver.flow_controls += data.count(_XON) + data.count(_XOFF)
         if self._forget_on_send and (self.sender.waiting or not self._is_listening):
             if not self.sender.waiting:
                 receiver.count_unheard(data)
             return  # these bytes came before our command left, so they cannot answer it
-        if self._is_listening and now > receiver.quiet_at:
+        if self._is_listening and now - receiver.last_heard > receiver.pause_limit:
             if not decoder.in_message:
                 decoder.reset()  # a symbol that broke off must not swallow the next one
             elif now > self._message_end():
@@ -328,7 +331,7 @@ class Machine:
         decoder.feed(data)
         self._deliver_symbols()
         # A message that began in time, and is not too slow, is heard to its end.
-        if receiver.began_in_time(now, self._due) and self._is_listening \
+        if decoder.in_message and receiver.began_in_time(now, self._due) and self._is_listening \
                 and self.deadline is not None and not isinstance(self._step, Rest):
             self.deadline = max(self.deadline, receiver.hears_until)
 
@@ -342,7 +345,8 @@ class Machine:
     def _message_end(self) -> float:
         """Return when a message that stops is over, infinite while an answer is waited for."""
         is_idle = self.deadline is None or isinstance(self._step, Rest)
-        return self.receiver.quiet_at if is_idle and self._is_listening else math.inf
+        return self.receiver.last_heard + self.receiver.pause_limit \
+            if is_idle and self._is_listening else math.inf
 
     def handle_timeout(self, now: float) -> None:
         """Do what is due when the clock reads ``now``; nothing before ``next_call``."""

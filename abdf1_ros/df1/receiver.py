@@ -39,8 +39,6 @@ QUIET_CHARACTERS = 20
 _SLOWEST = 4
 _LONGEST = 2 * MAX_LINK_DATA
 
-_XON, _XOFF = b'\x11', b'\x13'
-
 
 class _Incoming(NamedTuple):
     """
@@ -65,6 +63,7 @@ class Receiver:
 
     - ``decoder``: makes symbols of the bytes.
     - ``last_heard``: when the last bytes came (clock value in s).
+    - ``pause_limit``: longest pause (s) inside a frame.
     - ``flow_controls``: how many bytes 11 and 13 hex came, which software flow control swallows.
     """
 
@@ -79,13 +78,8 @@ class Receiver:
         self._is_master = is_master
         self._char_time = char_time
         self._counters = counters
-        self._pause_limit = QUIET_CHARACTERS * char_time + HELD_BACK  # inside a frame
+        self.pause_limit = QUIET_CHARACTERS * char_time + HELD_BACK
         self._message = _Incoming()
-
-    def count(self, data: bytes) -> None:
-        """Count the characters of bytes that came."""
-        self._counters.chars_received += len(data)
-        self.flow_controls += data.count(_XON) + data.count(_XOFF)
 
     def count_unheard(self, data: bytes) -> None:
         """Count the symbols of bytes that came while a master does not listen."""
@@ -125,11 +119,6 @@ class Receiver:
                 return NOISE
         return symbol
 
-    @property
-    def quiet_at(self) -> float:
-        """Return when the line is quiet if no more bytes come (clock value in s)."""
-        return self.last_heard + self._pause_limit
-
     def message_begun(self, now: float) -> float:
         """Return when the last message began to come in; ``now`` if it came in one piece."""
         is_known = self._message.number == self.decoder.begun
@@ -137,12 +126,10 @@ class Receiver:
 
     def began_in_time(self, now: float, due: float) -> bool:
         """
-        Tell whether a message is coming in that began by ``due``.
+        Tell whether the message that is coming in began by ``due``.
 
         Call this after each read: the first call for a message sets the time of its begin.
         """
-        if not self.decoder.in_message:
-            return False
         if self._message.number != self.decoder.begun:
             self._message = _Incoming(
                 self.decoder.begun, now, self._counters.chars_received, now <= due)
@@ -155,5 +142,5 @@ class Receiver:
             return -math.inf
         heard = self._counters.chars_received - self._message.heard
         characters = min(_SLOWEST * heard, _LONGEST)
-        return min(self.quiet_at, self._message.begun
-                   + 2 * self._pause_limit + characters * self._char_time)
+        return min(self.last_heard + self.pause_limit, self._message.begun
+                   + 2 * self.pause_limit + characters * self._char_time)
