@@ -26,6 +26,7 @@ import sys
 from abdf1_ros.paths import expanded
 from abdf1_ros.ros.launching import (
     descriptions,
+    has_substitutions,
     misspelt,
     parameter_types,
     scope_of,
@@ -100,9 +101,9 @@ def bridge(arguments: dict[str, str], restore: OpaqueFunction) -> Node:
     # The last entry wins, so arguments come after the file. The file may contain $(find-pkg-share
     # ...).
     parameters: list[ParameterFile | dict[str, ParameterValue]] = []
-    if arguments['params_file']:
+    if params_file := expanded(arguments['params_file']):
         parameters.append(ParameterFile(
-            expanded(arguments['params_file']), allow_substs=True))
+            params_file, allow_substs=has_substitutions(params_file)))
     if given:
         parameters.append(given)
     return Node(

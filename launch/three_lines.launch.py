@@ -24,7 +24,13 @@ launch.
 import sys
 
 from abdf1_ros.paths import expanded
-from abdf1_ros.ros.launching import misspelt, parameter_types, scope_of, unknown_arguments
+from abdf1_ros.ros.launching import (
+    has_substitutions,
+    misspelt,
+    parameter_types,
+    scope_of,
+    unknown_arguments,
+)
 from launch import LaunchContext, LaunchDescription
 from launch.actions import (
     DeclareLaunchArgument,
@@ -82,7 +88,7 @@ def all_lines(lines_file: str, restore: OpaqueFunction) -> Node:
         return [TimerAction(period=2.0, actions=[GroupAction([
             restore, all_lines(lines_file, restore)])])]
 
-    sections = ParameterFile(lines_file, allow_substs=True)
+    sections = ParameterFile(lines_file, allow_substs=has_substitutions(lines_file))
     return Node(package='abdf1_ros', executable='lines', output='screen', parameters=[sections],
                 sigterm_timeout=LONGEST_END, on_exit=started_again)
 

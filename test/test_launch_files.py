@@ -191,6 +191,19 @@ def test_arguments_reach_the_node_and_beat_the_parameter_file(
     ended(process)
 
 
+@pytest.mark.parametrize('arguments', [
+    ['bridge.launch.py', 'params_file'],
+    ['three_lines.launch.py', 'one_process:=true', 'lines_file']])
+def test_fault_of_a_parameter_file_names_the_file_of_the_user(
+        launch: Starter, tmp_path: Path, arguments: list[str]) -> None:
+    params = tmp_path / 'params.yaml'
+    params.write_text('/abdf1: {ros__parameters: {port: !x y}}\n')
+    *given, name = arguments
+    process = launch(*given, f'{name}:={params}')
+    process.wait_for(f'{params}:1:34: the tag !x: ROS does not know it')
+    process.result()
+
+
 def test_port_that_reads_like_a_number_is_text(launch: Starter) -> None:
     process = launch('bridge.launch.py', *EXAMPLE, 'port:=99')
     process.wait_for('/dev/ttyS98: cannot open the port')

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Arguments of the launch files, checks of names and values, and the scope of a restart."""
+"""Arguments and files of the launch files, checks of names and values, the scope of a restart."""
 
 from __future__ import annotations
 
@@ -117,6 +117,18 @@ def unusable(given: Mapping[str, str]) -> list[str]:
         except ValueError as error:
             problems.append(printable(str(error)))
     return problems
+
+
+def has_substitutions(params_file: str) -> bool:
+    """
+    Return True if launch has to replace something in a parameter file.
+
+    Launch gives the node a copy then, and faults name this copy instead of the user's file.
+    """
+    try:
+        return '$(' in Path(params_file).read_text(encoding='utf-8', errors='replace')
+    except OSError:  # launch tells why
+        return True
 
 
 def scope_of(context: Any) -> Callable[[Any], None]:
