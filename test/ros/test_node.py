@@ -586,14 +586,16 @@ def test_two_topics_that_remaps_give_one_name_are_told_at_the_start(
     (['--ros-args', '--help'], 'write this before --ros-args: '),
     (['--ros-args', '-r', '__ns:=cell'], 'a namespace begins with "/"; '),
     (['--ros-args', '-r', '__ns:=/cell//x'], 'a namespace has names of letters, digits and '
-     'underscores, each after one "/"; '),
+     'underscores, each after one "/", and no "/" at its end; '),
+    (['--ros-args', '-r', '__ns:=/cell/'], 'a namespace has names of letters, digits and '
+     'underscores, each after one "/", and no "/" at its end; '),
     (['--ros-args', '__ns:=/cell'], '-r is missing before '),
     (['--ros-args', '-p'], ''),
     (['--ros-args', '--bogus'], ''),
     (['--ros-args', '-r', f'__ns:=/{240 * "n"}'], ''),
     (['--ros-args', '-r', f'__ns:=/{300 * "n"}'], ''),
     (['--ros-args', '-r', f'__node:={256 * "n"}'], '')],
-    ids=['remap', 'colon', 'bare', 'list', 'help', 'namespace', 'slashes', 'bare_name',
+    ids=['remap', 'colon', 'bare', 'list', 'help', 'namespace', 'slashes', 'end', 'bare_name',
          'parameter', 'unknown', 'topic', 'long', 'name'])
 def test_unusable_arguments_are_told_in_one_line(
         refusal: Callable[..., list[str]], arguments: list[str], expected: str) -> None:

@@ -77,8 +77,9 @@ _ADVICE = (
     (r"parameter override rule: '-p \w+=", 'a parameter is NAME:=VALUE, with a colon; '),
     (r"override rule: '-p [\w.]+:=\[", 'put quotes around a text with [ or :; '),
     (r"^\['--?[hv]", 'write this before --ros-args: '),
-    (r'remap rule: .*__ns:=/', 'a namespace has names of letters, digits and underscores, each '
-     'after one "/"; '),
+    (r'remap rule: .*__ns:=/|invalid node namespace: (?!.*should not exceed)',
+     'a namespace has names of letters, digits and underscores, each after one "/", and no "/" at '
+     'its end; '),
     (r'remap rule: .*__ns:=', 'a namespace begins with "/"; '),
     (r'remap rule: .*__(?:node|name):=', 'a node name has letters, digits and underscores; '))
 
