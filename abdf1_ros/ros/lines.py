@@ -257,7 +257,11 @@ class Lines:
     def run(self, ended: EndRequest) -> int:
         """Run all lines until the end, if enough lines can run; return the exit status."""
         running = sum(line.node is not None for line in self._lines)
-        self._node.get_logger().info(f'{running} of {len(self._lines)} lines run')
+        told = f'{running} of {len(self._lines)} lines run'
+        if running == len(self._lines):
+            self._node.get_logger().info(told)
+        else:
+            self._node.get_logger().warning(told)
         if running < (len(self._lines) if self._node.is_strict else 1):
             return EXIT_CONFIGURATION
         return self._runner.run(ended)

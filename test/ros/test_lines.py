@@ -18,6 +18,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, nullcontext
 from itertools import pairwise
 from pathlib import Path
+import re
 import resource
 import socket
 from statistics import median
@@ -334,7 +335,8 @@ def test_second_process_of_the_same_name_is_a_warning(plant: Plant, capfd: Outpu
         other.destroy_node()
     assert status.message.startswith(f'WARN: 3 of 3 lines run; {text}')
     logged = capfd.readouterr().err
-    assert '2 of 3 lines run' in logged and text in logged
+    assert re.search(r'\[WARN\] \[[0-9.]+\] \[lines\]: 2 of 3 lines run', logged)
+    assert text in logged
 
 
 def test_process_may_open_as_many_files_as_the_system_allows(
