@@ -63,14 +63,39 @@ CASES = (
     Case('S:10', [7], [16]),
 )
 
+# Those that an EtherNet/IP client has more, by family. In an SLC slot 1 is the only one with
+# inputs, and slot 2 the only one with outputs: some clients count the words of the whole image.
+ETHERNET_CASES = {
+    'SLC': (
+        Case('I:1', [0x1010, 5], [4112, -2]),
+        Case('O:2', [-3, 16], [0x0310, 1]),
+        Case('L10:0', [0x10101010, -0x80000000], [0x7FFFFFFF, -70000]),
+        Case('L10:5', [123456789], [-0x10101011]),
+    ),
+    'PLC5': (
+        Case('I:017', [0x1010], [4112]),
+        Case('O:003', [-3, 16], [0x0310, 1]),
+    ),
+}
+
+# Those of ab_server, whose files have these numbers.
+AB_SERVER_CASES = (
+    *(case for case in CASES if case.address in ('N7:0', 'N7:20', 'F8:0')),
+    Case('L19:2', [0x10101010, -0x80000000], [0x7FFFFFFF, -70000]),
+    Case('ST18:1', 'Tank 4', 'a\x10b'),
+)
+
 
 def same(expected: Values, got: object) -> bool:
-    """Tell whether values are the same; 16-bit words may come signed or not."""
+    """Tell whether values are the same; a word may come signed or not, a long is signed."""
     if isinstance(expected, str):
         return got == expected
     if not isinstance(got, list) or len(got) != len(expected):
         return False
     if all(isinstance(value, int) for value in expected):
-        return [int(value) & 0xFFFF for value in got] == [
-            int(value) & 0xFFFF for value in expected]
+        return [*map(_unsigned, got)] == [*map(_unsigned, expected)]
     return got == expected
+
+
+def _unsigned(value: float) -> float:
+    return int(value) & 0xFFFF if -0x8000 <= value <= 0xFFFF else value

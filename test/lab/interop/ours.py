@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 import sys
 import time
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex
@@ -42,8 +42,12 @@ from abdf1_ros.ros.topics.messages import MESSAGES, values_of, write_qos
 from abdf1_ros.simulator.gateway import stations_of
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 from cases import Case, same, Values
+from plain import decoded, encoded, PlainLine, PlainPlc, SIZES, split
 from std_msgs.msg import String
+from support.odd_device import OddDevice, Wiring
 from support.ros import Inbox, Observer, Process, ros_args, write_csv
+
+Device = TypeVar('Device', bound=OddDevice)
 
 OURS, THEIRS = 5, 1  # stations of the node, and of what answers it
 BESIDE, VIA = 2, 7  # a second station on the line, and a gateway
@@ -145,6 +149,55 @@ class PlcEnd:
     def close(self) -> None:
         """End it."""
         self._link.stop()
+
+
+def wired(kind: type[Device], setup: Setup) -> Device:
+    """Return a device that is station 1, beside another, or with it behind a gateway."""
+    if setup.mode == 'Peer':
+        return kind(Wiring.FULL, THEIRS)
+    nodes = THEIRS, BESIDE
+    device = kind(Wiring.HALF, THEIRS if setup.via is None else setup.via, nodes)
+    if setup.via is None:
+        device.stations = device.nodes
+    return device
+
+
+class PlainEnd:
+    """A PLC that shares no code with the package at the end of a line, as station 1."""
+
+    def __init__(self, setup: Setup) -> None:
+        self._plc = wired(PlainPlc, setup)
+        self._plc.is_plc5 = setup.family is PlcType.PLC5
+        for case in setup.cases:  # the other station has other values at the same addresses
+            number, at = self._plc.place(case.address)
+            self._plc.files[BESIDE][number][at:at + 84] = 84 * b'\x55'
+        self._line = PlainLine(setup.port, self._plc)
+
+    def give(self, case: Case, values: Values) -> None:
+        """Put values into the PLC's files."""
+        letters, _, _, _, bit = split(case.address)
+        number, at = self._plc.place(case.address)
+        file = self._plc.files[THEIRS][number]
+        if bit is None:
+            data = encoded(letters, values)
+            file[at:at + len(data)] = data
+            return
+        byte = at + bit // 8
+        file[byte] = file[byte] & ~(1 << bit % 8) | bool(values[0]) << bit % 8
+
+    def take(self, case: Case, expected: Values) -> Values:
+        """Return what is in the PLC's files."""
+        letters, _, _, _, bit = split(case.address)
+        number, at = self._plc.place(case.address)
+        file = self._plc.files[THEIRS][number]
+        if bit is not None:
+            return [file[at + bit // 8] >> bit % 8 & 1]
+        size = SIZES[letters] if letters in ('ST', 'F', 'L') else 2
+        return decoded(letters, bytes(file[at:at + size * case.count]))
+
+    def close(self) -> None:
+        """End it."""
+        self._line.close()
 
 
 def wanted(values: Values, kind: ValueType) -> Values:

@@ -28,6 +28,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, ExitStack, suppress
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import product
 import json
 import os
 from pathlib import Path
@@ -52,11 +53,25 @@ from abdf1_ros.pccc.families import dialect_of  # noqa: E402
 from abdf1_ros.pccc.file_types import PlcType  # noqa: E402
 from abdf1_ros.pccc.server import Server  # noqa: E402
 from abdf1_ros.pccc.values import ValueType  # noqa: E402
-from cases import Case, CASES, same, Values  # noqa: E402
+from cases import AB_SERVER_CASES, Case, CASES, ETHERNET_CASES, same, Values  # noqa: E402
 from ethernet import ask, DuplexLine, EthernetPlc, serve  # noqa: E402
-from ours import codec_of, End, NodeEnd, OURS, PlcEnd, Setup, THEIRS, VIA, wanted  # noqa: E402
+from ours import (  # noqa: E402
+    codec_of,
+    End,
+    NodeEnd,
+    OURS,
+    PlainEnd,
+    PlcEnd,
+    Setup,
+    THEIRS,
+    VIA,
+    wanted,
+    wired,
+)
+from plain import PlainLine  # noqa: E402
 from shared import crowd, OWN, share, Tally  # noqa: E402
 from support.ethernet_ip import EthernetClient  # noqa: E402
+from support.odd_device import OddDevice  # noqa: E402
 from support.ros import Process  # noqa: E402
 
 PATIENCE = 60.0  # s for an answer of a player
@@ -177,7 +192,8 @@ class EthernetWords:
         address, codec = codec_of(case, self._family)
         request = self._dialect.read(address, codec.words)
         data = self._dialect.read_data(address, codec.words, self._execute(*request))
-        return {'values': list(codec.decode(data))}
+        values = codec.decode(data)
+        return {'values': values if isinstance(values, str) else list(values)}
 
     def write(self, case: Case, values: Values) -> dict[str, Any]:
         """Put values there."""
@@ -194,6 +210,63 @@ class EthernetWords:
     def close(self) -> None:
         """End the connection."""
         self._plc.close()
+
+
+@contextmanager
+def ab_server(program: str, family: PlcType) -> Iterator[EthernetPlc]:
+    """Run ab_server; give the connection to it."""
+    number = free_port()
+    kind = {PlcType.SLC: 'SLC500', PlcType.PLC5: 'PLC/5'}[family]
+    with subprocess.Popen(
+            [program, f'--plc={kind}', f'--port={number}', '--tag=N7[300]', '--tag=F8[20]',
+             '--tag=ST18[10]', '--tag=L19[20]'],
+            stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL) as process:
+        try:
+            until_open(number)
+            yield EthernetPlc('127.0.0.1', number)
+        finally:
+            process.terminate()
+
+
+class ServedPlc(OddDevice):
+    """A PLC on a line for which an EtherNet/IP server works; the other station is but read."""
+
+    execute: Callable[[bytes], bytes]
+
+    def answer(self, data: bytes) -> tuple[int, bytes]:
+        """Return status and data of a reply."""
+        if data[2] & 0x0F != 0x0F:
+            return super().answer(data)
+        if data[0] != THEIRS:
+            return 0, b'\x55' * data[7]
+        reply = self.execute(data[2:])
+        return reply[1], reply[4:]
+
+
+class ServerEnd:
+    """ab_server at the end of a line, as station 1: our frames are not its, nor the package's."""
+
+    def __init__(self, program: str, setup: Setup) -> None:
+        self._stack = ExitStack()
+        plc = self._stack.enter_context(ab_server(program, setup.family))
+        self._words = EthernetWords(plc, setup)
+        self._stack.callback(self._words.close)
+        device = wired(ServedPlc, setup)
+        device.execute = plc.execute
+        self._stack.callback(PlainLine(setup.port, device).close)
+
+    def give(self, case: Case, values: Values) -> None:
+        """Put values there."""
+        self._words.write(case, values)
+
+    def take(self, case: Case, expected: Values) -> Values:
+        """Return what is there."""
+        values: Values = self._words.read(case)['values']
+        return values
+
+    def close(self) -> None:
+        """End it."""
+        self._stack.close()
 
 
 class Partner(Protocol):
@@ -306,14 +379,42 @@ def carry_out(run: Run, save: Path | None) -> list[tuple[str, str, bool]]:
         return [server_case(ours, partner, case) for case in cases]
 
 
-def through_place(run: Run, mode: str, save: Path | None) -> list[tuple[str, str, bool]]:
+@dataclass(frozen=True, slots=True)
+class FarEnd:
     """
-    Let an EtherNet/IP client reach our PLC at a place of our node; return what came of it.
+    What stands at the end of the line of a place.
+
+    It has the words of ``cases`` by family, knows these checks, and lacks the commands of the
+    runs ``not_for``.
+    """
+
+    name: str
+    start: Callable[[Setup], End]
+    cases: dict[PlcType, tuple[Case, ...]]
+    checks: tuple[Checksum, ...]
+    not_for: tuple[str, ...] = ()
+
+    @classmethod
+    def known(cls, program: str | None) -> list[FarEnd]:
+        """Return all of them; ``program`` is ab_server, if it is there."""
+        words = {family: CASES + ETHERNET_CASES[family.value]
+                 for family in (PlcType.SLC, PlcType.PLC5)}
+        return [cls('simulator', PlcEnd, words, tuple(Checksum)),
+                cls('plain', PlainEnd, words, (Checksum.CRC,)),
+                *([cls('ab_server', partial(ServerEnd, program),
+                       {PlcType.SLC: AB_SERVER_CASES}, (Checksum.CRC,),
+                       ('pycomm3',))] if program else [])]  # it writes with a mask (AB)
+
+
+def through_place(run: Run, mode: str, save: Path | None,
+                  far: FarEnd) -> list[tuple[str, str, bool]]:
+    """
+    Let an EtherNet/IP client reach a PLC at a place of our node; return what came of it.
 
     In Mode Master a second station has other values at the same addresses; "Via" is Mode Master
-    with both stations behind a gateway.
+    with both stations behind a gateway. ``far`` is the PLC.
     """
-    cases = [case for case in CASES if not run.only or case.address in run.only]
+    cases = far.cases[run.family]
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         capture = save / f'{run.name}_place_{mode}_{run.check.value}.cap'.lower() if save else None
@@ -323,7 +424,7 @@ def through_place(run: Run, mode: str, save: Path | None) -> list[tuple[str, str
             run.family, run.check, second, [*cases, OWN], folder,
             mode='Peer' if mode == 'Peer' else 'Master', via=VIA if mode == 'Via' else None,
             share=f'eip:127.0.0.1:{number}?station={THEIRS}', rights='All')
-        plc = PlcEnd(setup)
+        plc = far.start(setup)
         stack.callback(plc.close)
         for case in cases:
             plc.give(case, case.before)
@@ -334,6 +435,18 @@ def through_place(run: Run, mode: str, save: Path | None) -> list[tuple[str, str
         partner = run.reach(f'127.0.0.1:{number}')
         stack.callback(partner.close)
         return [server_case(plc, partner, case) for case in cases]
+
+
+def through_places(run: Run, options: argparse.Namespace) -> bool:
+    """Let a client reach each far end in each mode; return whether all was good."""
+    if run.ours != 'plc' or run.reach is None:
+        return True
+    all_good = True
+    for mode, far in product(('Peer', 'Master', 'Via'), FarEnd.known(options.ab_server)):
+        if run.check in far.checks and run.family in far.cases and run.name not in far.not_for:
+            all_good &= show(f'{run.text}, {mode}, {far.name}',
+                             through_place(run, mode, options.save, far))
+    return all_good
 
 
 def crowd_at_place(run: Run, mode: str, sessions: int, seconds: float) -> Tally:
@@ -371,13 +484,16 @@ class OwnEthernetClient:
         return {'values': values if isinstance(values, str) else list(values)}
 
     def write(self, case: Case, values: Values) -> dict[str, Any]:
-        """Write whole words."""
-        if '/' in case.address:
-            return {'cannot': 'bits'}
+        """Write words, or bits."""
         address, codec = codec_of(case, self._family)
-        data = codec.encode(wanted(values, codec.type))
-        answer = self._execute(*self._dialect.write(address, data))
-        return answer if 'error' in answer else {'done': True}
+        if codec.type is ValueType.BOOL:
+            assert not isinstance(values, str)
+            requests = [self._dialect.write_bits(*change)
+                        for change in codec.bit_changes(address, values)]
+        else:
+            requests = [self._dialect.write(address, codec.encode(wanted(values, codec.type)))]
+        answers = [self._execute(*request) for request in requests]
+        return next((answer for answer in answers if 'error' in answer), {'done': True})
 
     def _execute(self, cmd: int, data: bytes) -> dict[str, Any]:
         self._tns = self._tns % 0xFFFF + 1
@@ -602,12 +718,12 @@ def _needs_place(setup: Setup, port: str, stack: ExitStack) -> Partner:
 
 def node_runs(options: argparse.Namespace) -> list[Run]:
     """Return the runs with node-drivers, for a PLC-5, and nodepccc, for an SLC."""
-    reach = {product: ethernet_player('node_client.mjs', options.node, options.modules, product,
-                                      'HOST') for product in ('node-drivers', 'nodepccc')}
+    reach = {name: ethernet_player('node_client.mjs', options.node, options.modules, name, 'HOST')
+             for name in ('node-drivers', 'nodepccc')}
     return [
-        Run(product.replace('-', '_'), family, check, ours, ethernet_client(reach[product]),
-            reach=reach[product])
-        for product, family in (('node-drivers', PlcType.PLC5), ('nodepccc', PlcType.SLC))
+        Run(name.replace('-', '_'), family, check, ours, ethernet_client(reach[name]),
+            reach=reach[name])
+        for name, family in (('node-drivers', PlcType.PLC5), ('nodepccc', PlcType.SLC))
         for ours in ('plc', 'node') for check in Checksum]
 
 
@@ -625,14 +741,7 @@ def libplctag_runs(options: argparse.Namespace) -> list[Run]:
         return runs
 
     def server(setup: Setup, port: str, stack: ExitStack) -> Partner:
-        number = free_port()
-        kind = {PlcType.SLC: 'SLC500', PlcType.PLC5: 'PLC/5'}[setup.family]
-        process = stack.enter_context(subprocess.Popen(
-            [options.ab_server, f'--plc={kind}', f'--port={number}', '--tag=N7[100]',
-             '--tag=F8[20]'], stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL))
-        stack.callback(process.terminate)
-        until_open(number)
-        plc = EthernetPlc('127.0.0.1', number)
+        plc = stack.enter_context(ab_server(options.ab_server, setup.family))
         line = DuplexLine(port, setup.check)
         ended = threading.Event()
         thread = threading.Thread(target=ask, args=(line, plc.execute, ended.is_set))
@@ -673,6 +782,8 @@ def _options() -> argparse.Namespace:
                         help='let so many of them share one such place (16)')
     parser.add_argument('--seconds', metavar='S', type=float, default=600.0,
                         help='how long (600)')
+    parser.add_argument('--ab-server', metavar='PROGRAM',
+                        help='ab_server of libplctag: with --place behind our node, too')
     products = parser.add_subparsers(dest='product', required=True)
     products.add_parser('df1py3').set_defaults(runs=df1py3_runs)
     entry = products.add_parser('libpccc')
@@ -696,7 +807,6 @@ def _options() -> argparse.Namespace:
     entry = products.add_parser('libplctag')
     entry.set_defaults(runs=libplctag_runs)
     entry.add_argument('--library', required=True, help='libplctag.so')
-    entry.add_argument('--ab-server', help='the program ab_server')
     return parser.parse_args()
 
 
@@ -710,8 +820,7 @@ def main() -> int:
         if options.only not in run.text:
             continue
         if options.place:
-            for mode in ('Peer', 'Master', 'Via') if run.ours == 'plc' and run.reach else ():
-                all_good &= show(f'{run.text}, {mode}', through_place(run, mode, options.save))
+            all_good &= through_places(run, options)
         elif options.sessions is not None:
             for mode in ('Peer', 'Master') if run.ours == 'plc' and run.reach else ():
                 tally = crowd_at_place(run, mode, options.sessions, options.seconds)

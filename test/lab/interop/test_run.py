@@ -96,12 +96,21 @@ def test_every_value_goes_to_and_fro(run: ModuleType) -> None:
     assert len(told) == len(run.CASES)
 
 
-@pytest.mark.parametrize('mode', ['Peer', 'Via'])
-def test_every_value_goes_through_an_ethernet_place(run: ModuleType, mode: str) -> None:
+@pytest.mark.parametrize(('mode', 'far'), [('Peer', 'simulator'), ('Via', 'plain')])
+def test_every_value_goes_through_an_ethernet_place(
+        run: ModuleType, mode: str, far: str) -> None:
     entry, = (each for each in run.our_runs(None) if each.check is Checksum.CRC)
-    told = run.through_place(entry, mode, None)
+    end, = (each for each in run.FarEnd.known(None) if each.name == far)
+    told = run.through_place(entry, mode, None, end)
     assert [entry for entry in told if not entry[2]] == []
-    assert len(told) == len(run.CASES)
+    assert len(told) == len(run.CASES) + len(run.ETHERNET_CASES['SLC'])
+
+
+def test_a_long_is_the_same_with_both_of_its_words_alone(run: ModuleType) -> None:
+    assert run.same([-70000, 0x7FFFFFFF], [-70000, 0x7FFFFFFF])
+    assert not run.same([0x10001], [1])
+    assert run.same([-1, 1], [0xFFFF, 1])
+    assert run.same([-16.0], [-16])
 
 
 def test_sessions_of_a_place_share_the_line_of_a_node_at_work(run: ModuleType) -> None:

@@ -23,7 +23,8 @@ import sys
 from player import Cannot, play
 
 TIMEOUT = 5000  # ms
-SIZES = {'N': 2, 'B': 2, 'S': 2, 'F': 4, 'ST': 84, 'T': 6, 'C': 6, 'R': 6}
+SIZES = {'N': 2, 'B': 2, 'S': 2, 'I': 2, 'O': 2, 'F': 4, 'L': 4, 'ST': 84, 'T': 6, 'C': 6, 'R': 6}
+FIXED = {'O': 0, 'I': 1, 'S': 2}  # numbers of files
 
 
 def main() -> None:
@@ -42,7 +43,9 @@ def main() -> None:
         match = re.fullmatch(r'([A-Z]+)(\d*):(\d+)(?:\.(\w+))?(?:/(\d+))?', address)
         assert match, address
         letter, table, element, member, bit = match.groups()
-        name = f'{letter}{table or 2}:{element}' + (f'.{member}' if member else '') + (
+        if letter in 'IO' and sys.argv[3] == 'plc5':
+            element = int(element, 8)
+        name = f'{letter}{table or FIXED[letter]}:{element}' + (f'.{member}' if member else '') + (
             f'/{bit}' if bit else '')
         if letter in 'TCR' and not member:
             count = 1
@@ -63,6 +66,8 @@ def main() -> None:
                 return text.value.decode('latin-1')
             if letter == 'F':
                 return [library.plc_tag_get_float32(tag, 4 * number) for number in range(count)]
+            if letter == 'L':
+                return [library.plc_tag_get_int32(tag, 4 * number) for number in range(count)]
             return [library.plc_tag_get_int16(tag, 2 * number) for number in range(count)]
         finally:
             library.plc_tag_destroy(tag)
@@ -77,6 +82,8 @@ def main() -> None:
             for number, value in enumerate(values if letter != 'ST' else ()):
                 if letter == 'F':
                     checked(library.plc_tag_set_float32(tag, 4 * number, value))
+                elif letter == 'L':
+                    checked(library.plc_tag_set_int32(tag, 4 * number, value))
                 else:
                     checked(library.plc_tag_set_int16(
                         tag, 2 * number, ctypes.c_int16(value).value))

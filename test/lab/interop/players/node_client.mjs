@@ -88,7 +88,7 @@ async function nodePccc() {
       check(address);
       if (address.includes('.')) throw new Cannot('0.1.17 writes 6 bytes where 2 are meant');
       const list = typeof values === 'string' ? [values] : values.map(
-        (value) => (address.startsWith('F') ? value : (value << 16) >> 16));
+        (value) => (/^[FL]/.test(address) ? value : (value << 16) >> 16));
       const wanted = address.includes('/') ? Boolean(list[0]) : list;
       return new Promise((resolve, reject) => {
         plc.writeItems(name(address, list.length), list.length > 1 ? wanted : [wanted].flat()[0],

@@ -42,7 +42,7 @@ def main() -> None:
         if '/' in address:
             value = bool(values[0])
         else:
-            words = [signed(value) if isinstance(value, int) else value for value in values]
+            words = [value if address[0] in 'FL' else signed(value) for value in values]
             value = words if len(words) > 1 else words[0]
         tag = driver.write((tag_of(address, len(values)), value))
         if tag.error:
@@ -61,6 +61,8 @@ def tag_of(address: str, count: int) -> str:
     """Return what it calls an address."""
     if re.match(r'[TCR]\d+:\d+$', address) or address.startswith('R'):
         raise Cannot('no elements of three words, and no R')
+    if address[0] in 'IO':  # it counts the words of the whole image
+        address = f'{address[0]}:0'
     return f'{address}{{{count}}}' if count > 1 else address
 
 
