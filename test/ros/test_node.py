@@ -206,15 +206,18 @@ def test_level_that_changes_is_published_at_once(
     bench = make_bench(PULSES, parameters=('snapshot_period:=0.0',))
     bench.node.link.stop()
     session, published, looks, checks = bench.node.session, [], [], []
-    session.publish_diagnostics(7.0)
-    following = session.next_diagnostics
-    session.publish_diagnostics(following + 0.3)
-    assert 7.0 < following <= 8.0 and session.next_diagnostics == pytest.approx(following + 1.0)
-    monkeypatch.setattr(session, 'publish_diagnostics', published.append)
+    publisher = session.status_publisher
+    publisher.publish(7.0, is_waiting=False)
+    following = publisher.next_publication
+    publisher.publish(following + 0.3, is_waiting=False)
+    assert 7.0 < following <= 8.0
+    assert publisher.next_publication == pytest.approx(following + 1.0)
+    monkeypatch.setattr(publisher, 'publish', lambda *now, is_waiting: published.append(now))
     monkeypatch.setattr(session.link_counters, 'check', checks.append)
     monkeypatch.setattr(bench.node.writes.host_clock, 'look', lambda *now: looks.append(now))
     monkeypatch.setattr(bench.node.surroundings.snapshot, 'has_subscribers', pytest.fail)
-    session.levels, session.next_diagnostics = session.diagnostics.levels(7.0)[::-1], math.inf
+    publisher.levels = session.diagnostics.levels(7.0)[::-1]
+    publisher.next_publication = math.inf
     for _ in range(2):
         session.check()
     assert (len(published), len(checks), [now < wall for now, wall in looks]) == (

@@ -178,7 +178,8 @@ class BridgeNode(AnsweringNode):
         """Disconnect guests, publish the last state, wait for acks until a monotonic time."""
         self.session.guests.stop()
         self._opener.close()
-        self.session.publish_diagnostics(line_time())
+        self.session.status_publisher.publish(
+            line_time(), is_waiting=self.session.is_waiting)
         # DDS would lose messages that are still under way when their publisher ends.
         self.surroundings.results.wait_for_all_acked(max(0.0, give_up - time.monotonic()))
         self.surroundings.diagnostics.wait_for_all_acked(

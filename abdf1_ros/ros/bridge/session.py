@@ -24,7 +24,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 import math
-import random
 import time
 
 from abdf1_ros.driver.driver import Driver
@@ -36,6 +35,7 @@ from abdf1_ros.ports.link_thread import LinkThread, PortState
 from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.ros.bridge.guests import GuestPlaces
 from abdf1_ros.ros.bridge.offer import OfferedPublisher
+from abdf1_ros.ros.bridge.status_publisher import StatusPublisher
 from abdf1_ros.ros.callbacks import AnsweringNode
 from abdf1_ros.ros.diagnostics.alarms import Alarms
 from abdf1_ros.ros.diagnostics.events import LineEvents
@@ -52,14 +52,10 @@ from abdf1_ros.ros.topics.interlocks import InterlockWatch
 from abdf1_ros.ros.topics.messages import ACTIVE_LAYOUT
 from abdf1_ros.ros.topics.reads import ReadTopic, ReadTopics
 from abdf1_ros.ros.topics.services import RowServices
-from abdf1_ros.ros.topics.snapshot import Snapshot
 from abdf1_ros.ros.topics.writes import WriteTopic, WriteTopics
-from abdf1_ros.ros.untyped import RosPublisher
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.resets import lost_by_reset
 from abdf1_ros.text import first
-from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.clock import Clock, ClockType
 from rclpy.impl.logging_severity import LoggingSeverity
 from rclpy.publisher import Publisher
 from std_msgs.msg import UInt16MultiArray
@@ -138,6 +134,9 @@ class BridgeSession:
         self.diagnostics = Diagnostics(
             node.get_fully_qualified_name().lstrip('/'), self.driver, self.port,
             self.events, configuration.map_problems, self.guests.lines, self._alarms.statuses)
+        self.status_publisher = StatusPublisher(
+            node, surroundings.diagnostics, surroundings.snapshot, parameters, self.diagnostics,
+            self._alarms, self.driver.points)
         self.owners = InterlockWatch(node, self.driver)
         our_name, names = node.get_fully_qualified_name(), TopicNames.of(
             node.resolve_topic_name, mappings)
@@ -154,11 +153,6 @@ class BridgeSession:
         self._port_text = ''
         # Of an open port that a reload keeps: our line if it was, or from the first answer on.
         self._is_ours, self._opened = surroundings.is_offered, -math.inf
-        self.levels: list[bytes] = []
-        self.next_diagnostics = self._next_snapshot = 0.0
-        self._snapshot: Snapshot | None = None
-        # A random start, so that the nodes of a process do not publish all at the same moment.
-        self._phase = random.uniform(0.0, parameters.diagnostics_period)
         if surroundings.is_offered:
             # Subscriptions first: after thousands of publishers, each subscription takes DDS 5 ms.
             self.writers = self._open_writers()
@@ -353,16 +347,9 @@ class BridgeSession:
         for watch in self._watches:
             self._look(watch, now)
         try:
-            self._publish_statuses(now)
+            self.status_publisher.look(now, is_waiting=self.is_waiting)
         except Exception as error:  # a status must not end a bridge
             self._surroundings.node.tell_failure('a status', error)
-
-    def _publish_statuses(self, now: float) -> None:
-        levels = self.diagnostics.levels(now, is_waiting=self.is_waiting)
-        if now >= self.next_diagnostics or levels != self.levels:
-            self.levels = levels
-            self.publish_diagnostics(now)
-        self._publish_snapshot(now)
 
     def _look(self, watch: Watch, now: float) -> None:
         """Log the news of a watch; a watch fails if DDS reports a name that rclpy cannot read."""
@@ -371,33 +358,6 @@ class BridgeSession:
                 self.events.notes.tell(news)
         except Exception as error:
             self._surroundings.node.tell_failure('a periodic check', error)
-
-    def publish_diagnostics(self, now: float) -> None:
-        """Publish all statuses at the clock value ``now`` (s)."""
-        period = self.configuration.parameters.diagnostics_period
-        self.next_diagnostics = now + period - (now - self._phase) % period
-        statuses = self.diagnostics.statuses(now, is_waiting=self.is_waiting)
-        if not self.is_waiting:
-            self._alarms.forget()
-        self._publish(self._surroundings.diagnostics, DiagnosticArray(status=statuses))
-
-    def _publish_snapshot(self, now: float) -> None:
-        """Publish all values if it is time and there is a subscriber."""
-        period = self.configuration.parameters.snapshot_period
-        if not period or now < self._next_snapshot:
-            return
-        self._next_snapshot = now + period
-        if self._surroundings.snapshot.has_subscribers():
-            self._snapshot = self._snapshot or Snapshot(self.driver.points)
-            self._publish(self._surroundings.snapshot, self._snapshot.message(now))
-
-    def _publish(self, publisher: RosPublisher, message: DiagnosticArray) -> None:
-        # While simulated time is 0, use system time: otherwise this message would sort before all
-        # earlier messages.
-        now = self._surroundings.node.get_clock().now()
-        stamped = now if now.nanoseconds else Clock(clock_type=ClockType.SYSTEM_TIME).now()
-        message.header.stamp = stamped.to_msg()
-        publisher.publish(message)
 
 
 def tell_plcs(sessions: Sequence[BridgeSession], what: str, limit: float, *,
