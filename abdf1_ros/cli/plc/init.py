@@ -25,7 +25,7 @@ from pathlib import Path
 from abdf1_ros.cli.plc import files
 from abdf1_ros.cli.plc.data import processor_cell
 from abdf1_ros.cli.plc.detect import Found
-from abdf1_ros.cli.plc.line import free_station, MODES
+from abdf1_ros.cli.plc.line import free_station, MODES, unusual_bits
 from abdf1_ros.cli.plc.presence import Presence
 from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.file_search import DataFile
@@ -98,18 +98,23 @@ def nodes_of(gateway: int, mode: str) -> str:
 def net_csv(network: Network, found: Found, stations: Collection[int]) -> str:
     """Return a net CSV with the settings found; our own Station is not in ``stations``."""
     settings = found.settings
-    row = (free_station(settings.on(network).station, stations), settings.mode, settings.check,
-           network.port, settings.baud, network.parity, _TIMEOUT)
-    return ('Station,Mode,Error_Code,Com_Port,Baud,Parity,Timeout\n'
-            + ','.join(map(str, row)))
+    return _csv({
+        'Station': free_station(settings.on(network).station, stations), 'Mode': settings.mode,
+        'Error_Code': settings.check, 'Com_Port': network.port, 'Baud': settings.baud,
+        'Parity': network.parity, **unusual_bits(network), 'Timeout': _TIMEOUT})
 
 
 def listening_csv(network: Network) -> str:
     """Return a net CSV for Mode Listen."""
-    row = ('Listen', network.error_code, network.com_port, network.listen_port, network.baud,
-           network.parity)
-    return ('Mode,Error_Code,Com_Port,Listen_Port,Baud,Parity\n'
-            + ','.join(map(str, row)) + '\n')
+    return _csv({
+        'Mode': 'Listen', 'Error_Code': network.error_code, 'Com_Port': network.com_port,
+        'Listen_Port': network.listen_port, 'Baud': network.baud, 'Parity': network.parity,
+        **unusual_bits(network)}) + '\n'
+
+
+def _csv(cells: Mapping[str, object]) -> str:
+    """Return a net CSV with these cells by column, without the last line end."""
+    return f'{",".join(cells)}\n{",".join(map(str, cells.values()))}'
 
 
 def map_rows(stations: Iterable[Presence], listed: Mapping[int, Sequence[DataFile]],

@@ -23,7 +23,7 @@ from dataclasses import replace
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.stations import MAX_STATION
 from abdf1_ros.problems import ConfigurationError, Problem
-from abdf1_ros.settings.network import load_network, make_network, Network
+from abdf1_ros.settings.network import FIELDS, load_network, make_network, Network
 
 # For a user who waits, the default Timeout of a net CSV (1000 ms) is long.
 DEFAULTS = Network(timeout=300)
@@ -37,7 +37,14 @@ MODES = {Duplex.HALF.name.lower(): 'Master', Duplex.FULL.name.lower(): 'Peer',
 
 # Options, each for a column of the net CSV.
 _COLUMNS = {'port': 'com_port', 'baud': 'baud', 'check': 'error_code', 'parity': 'parity',
-            'timeout': 'timeout', 'own_station': 'station'}
+            'data_bits': 'data_bits', 'stop_bits': 'stop_bits', 'timeout': 'timeout',
+            'own_station': 'station'}
+
+
+def unusual_bits(network: Network) -> dict[str, int]:
+    """Return data bits and stop bits of a line by their columns, if they are not 8 and 1."""
+    return {FIELDS[name].column: value for name in ('data_bits', 'stop_bits')
+            if (value := getattr(network, name)) != getattr(DEFAULTS, name)}
 
 
 def free_station(own: int, taken: Collection[int | None]) -> int:

@@ -55,7 +55,7 @@ _TRIED = 'tries all'
 DETECT_DEFAULTS = LineDefaults(
     baud=f'{_TRIED}; none for a URL', check=_TRIED, duplex=_TRIED,
     timeout='200',  # most attempts get no answer
-    net='port, parity and own station')
+    net='port, parity, bits and own station')
 
 
 def add_station(parser: argparse.ArgumentParser) -> None:
@@ -107,6 +107,8 @@ def add_line_options(parser: argparse.ArgumentParser, defaults: LineDefaults,
     group.add_argument('--check', type=str.upper,
                        help=f'check of messages: CRC or BCC (default: {defaults.check})')
     group.add_argument('--parity', help='None, Even or Odd (default: None)')
+    group.add_argument('--data-bits', metavar='N', help='5 to 8 (default: 8, as DF1 needs)')
+    group.add_argument('--stop-bits', metavar='N', help='1 or 2 (default: 1)')
     if has_link:
         _add_duplex(group, defaults)
     group.add_argument('--own-station', metavar='N',

@@ -193,10 +193,12 @@ def test_commands_work_over_a_tcp_connection(files: Files, capsys: Output) -> No
     with running_simulator('--tcp', '127.0.0.1:0', '--data', str(files.simulator)) as process:
         url = process.wait_for('socket://').partition(' on ')[2].partition(',')[0]
         assert call(main, capsys, 'read', 'N7:0', '--port', url, *PATIENT).lines == ['N7:0 1200']
-        said = call(main, capsys, 'detect', '--port', url, '--parity', 'Even', '--stations',
-                    '1', *PATIENT)
-    assert said.lines[1].endswith(f' 1 --port {url} --baud 9600 --check CRC --parity Even')
-    assert said.lines[-1] == f'5,Master,CRC,{url},9600,Even,300'
+        said = call(main, capsys, 'detect', '--port', url, '--parity', 'Even', '--stop-bits', '2',
+                    '--stations', '1', *PATIENT)
+    assert said.lines[1].endswith(
+        f' 1 --port {url} --baud 9600 --check CRC --parity Even --stop-bits 2')
+    assert said.lines[-2:] == ['Station,Mode,Error_Code,Com_Port,Baud,Parity,Stop_Bits,Timeout',
+                               f'5,Master,CRC,{url},9600,Even,2,300']
 
 
 def test_signal_ends_it(tmp_path: Path) -> None:

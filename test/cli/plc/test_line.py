@@ -46,9 +46,10 @@ def test_defaults_are_those_of_a_net_file_with_a_shorter_timeout() -> None:
 
 def test_every_option_sets_its_field_of_the_network() -> None:
     assert line_of('--port', '3', '--baud', '19200', '--check', 'bcc', '--parity', 'even',
-                   '--timeout', '150', '--own-station', '9', '--duplex', 'FULL') == Network(
-        com_port='3', baud=19200, error_code='BCC', parity='Even', timeout=150, station=9,
-        mode='Peer')
+                   '--data-bits', '7', '--stop-bits', '2', '--timeout', '150', '--own-station',
+                   '9', '--duplex', 'FULL') == Network(
+        com_port='3', baud=19200, error_code='BCC', parity='Even', data_bits=7, stop_bits=2,
+        timeout=150, station=9, mode='Peer')
 
 
 def test_peer_is_full_duplex_and_by_radio_a_timeout_is_for_the_reply() -> None:
@@ -181,7 +182,7 @@ def test_help_tells_what_detect_does_by_default(capsys: pytest.CaptureFixture[st
     text = help_of(capsys, 'detect')
     assert text.count('(default: tries all') == 3
     assert 'to wait for each answer (default: 200)' in text
-    assert 'take port, parity and own station from this net CSV' in text
+    assert 'take port, parity, bits and own station from this net CSV' in text
     text = help_of(capsys, 'scan')
     for default in (9600, 'CRC', 'half', 300):
         assert f'(default: {default})' in text

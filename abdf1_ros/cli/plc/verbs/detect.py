@@ -26,7 +26,7 @@ import sys
 
 from abdf1_ros.cli.plc import init, overhear, presence
 from abdf1_ros.cli.plc.detect import Found, found_settings, only_heard
-from abdf1_ros.cli.plc.line import MODES, network_of
+from abdf1_ros.cli.plc.line import MODES, network_of, unusual_bits
 from abdf1_ros.cli.plc.options import (
     add_line_options,
     add_stations_to_try,
@@ -65,9 +65,11 @@ def run(options: argparse.Namespace) -> int:
     if there.is_of_gateway:
         print(_BEHIND_GATEWAY)
     parity = '' if network.parity == 'None' else f' --parity {network.parity}'
+    bits = ''.join(f' --{column.lower().replace("_", "-")} {count}'
+                   for column, count in unusual_bits(network).items())
     own = '' if settings.own is None else f' --own-station {settings.own}'
     print(f'next: {called("plc")} {_first_task(found)} --port {network.port} '
-          f'--baud {settings.baud} --check {settings.check}{parity}{own}')
+          f'--baud {settings.baud} --check {settings.check}{parity}{bits}{own}')
     print(f'net.csv:\n{init.net_csv(network, found, [there.station])}')
     return 0
 
