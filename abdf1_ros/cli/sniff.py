@@ -68,6 +68,7 @@ from abdf1_ros.ports.tap import is_pty, Tap
 from abdf1_ros.ports.trace import begun_now, Trace
 from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings import BAUD_RATES, PARITIES
+from abdf1_ros.settings.hints import pasted
 from abdf1_ros.settings.network import Network, URLS
 from abdf1_ros.signals import limit_output, OUTPUTS
 from abdf1_ros.sniffer.capture import Chunk, LOST
@@ -420,7 +421,8 @@ def _recorded(name: str, options: argparse.Namespace) -> Iterator[tuple[Recordin
         for chunk in recording.chunks():
             yield recording, chunk
     except OSError as error:
-        raise Problem(name, f'cannot be read: {error.strerror or error}') from None
+        raise Problem(
+            name, f'cannot be read: {error.strerror or error}{pasted(name)}') from None
 
 
 def _listen(options: argparse.Namespace, output: Output) -> int:

@@ -39,6 +39,7 @@ from abdf1_ros.errors import PortLost
 from abdf1_ros.numbers import decimal_number, whole_number
 from abdf1_ros.paths import expanded, ShowVersion
 from abdf1_ros.problems import ConfigurationError
+from abdf1_ros.settings.hints import pasted
 from abdf1_ros.signals import drop, limit_output
 from abdf1_ros.text import printable
 
@@ -112,13 +113,19 @@ def run_command(name: str, work: Callable[[], int], interrupted: int = 0, unread
         return interrupted
     except ConfigurationError as error:
         for problem in error.problems:
-            complain(str(problem))
+            complain(_with_hint(str(problem)))
         return EXIT_USAGE
     except (NoPort, PortLost) as error:
         complain(str(error))
         return EXIT_FAILED
     except OSError as error:
         return unread if has_reader_left(error, complain) else EXIT_USAGE
+
+
+def _with_hint(fault: str, words: Sequence[str] = ()) -> str:
+    """Return a fault with the name of a character that looks like another; ``words`` are given."""
+    return fault if 'U+' in fault else fault + (
+        pasted(fault) or pasted(''.join(word for word in words if repr(word) in fault)))
 
 
 def is_terminal(stream: TextIO) -> bool:
@@ -199,7 +206,8 @@ def reason_of(name: str, error: OSError) -> str:
     text = error.strerror or str(error)
     advice = ADVICE.get(error.errno, '') if name.startswith('/dev/') else \
         f'a device path is /dev/{name}' if name.startswith('tty') else ''
-    return (text if name in text else f'{name}: {text}') + (f'; {advice}' if advice else '')
+    return (text if name in text else f'{name}: {text}') + (
+        f'; {advice}' if advice else '') + pasted(name)
 
 
 def may_replace(path: str, is_ours: Callable[[Path], bool]) -> bool:
@@ -277,12 +285,14 @@ class _Parser(argparse.ArgumentParser):
         """Make a parser; ``complete`` adds its arguments when the parser is used."""
         super().__init__(*args, **details)
         self._complete = complete
+        self._words: Sequence[str] = ()
         # Python's own pattern has no exponent, so -1.5e3 would be an option.
         self._negative_number_matcher = re.compile(r'-\d*\.?\d+(?:e[+-]?\d+)?', re.IGNORECASE)
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> tuple[Any, list[str]]:
         """Parse arguments, once; an unknown argument is an error."""
         self._complete(self)
+        self._words = sys.argv[1:] if args is None else args
         found, unknown = super().parse_known_args(args, namespace)
         if unknown:
             option = next((text for text in unknown if text.startswith('-')), '')
@@ -309,7 +319,7 @@ class _Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """End with status 2."""
-        self.exit(2, f'{self.prog}: error: {printable(message)}\n'
+        self.exit(2, f'{self.prog}: error: {printable(_with_hint(message, self._words))}\n'
                      f'"{self.prog} --help" lists the arguments\n')
 
 

@@ -37,7 +37,14 @@ import re
 from types import MappingProxyType
 
 from abdf1_ros.problems import ConfigurationError, Place, Problem
-from abdf1_ros.settings.hints import export_fault, hint, is_spreadsheet_error, row_hint, WORKBOOKS
+from abdf1_ros.settings.hints import (
+    export_fault,
+    hint,
+    is_spreadsheet_error,
+    pasted,
+    row_hint,
+    WORKBOOKS,
+)
 from abdf1_ros.text import shown
 
 _DELIMITERS = {',': 'comma', ';': 'semicolon', '\t': 'tab'}
@@ -181,7 +188,8 @@ def _read_text(path: str) -> str:
     except OSError as error:
         is_looked_for = isinstance(error, FileNotFoundError) and not Path(path).is_absolute()
         where = f' in the folder {Path.cwd()}' if is_looked_for else ''
-        raise Problem(path, f'cannot be read: {error.strerror or error}{where}') from None
+        raise Problem(
+            path, f'cannot be read: {error.strerror or error}{where}{pasted(path)}') from None
     if raw.startswith(WORKBOOKS):
         raise Problem(path, 'is a workbook or a project of some program, not text; save what is '
                             'in it as "CSV UTF-8"')

@@ -59,12 +59,29 @@ def hint(text: str) -> str:
     return ''
 
 
+def pasted(text: str) -> str:
+    """
+    Return the hint at the first character of a text that looks like one of ASCII, empty for none.
+
+    Such characters come from pages and mails: “ ” – and blanks that do not break. Letters of any
+    language are none.
+    """
+    character = next((each for each in text if not each.isascii() and _plain(each)), '')
+    return f'; "{character}" is {_name(character)}' if character else ''
+
+
 def _name(character: str) -> str:
     if character == '\t':
         return 'a tab, which divides no cells here'
     name = f'U+{ord(character):04X} {unicodedata.name(character, "")}'.rstrip()
+    plain = _plain(character)
+    return f'{name}, not "{plain}"' if plain else name
+
+
+def _plain(character: str) -> str:
+    """Return the characters of ASCII that a character looks like, empty for none."""
     plain = unicodedata.normalize('NFKC', character).translate(_ALIKE)
-    return f'{name}, not "{plain}"' if plain.isascii() and plain.isprintable() else name
+    return plain if plain.isascii() and plain.isprintable() else ''
 
 
 def looks_like_address(text: str) -> bool:

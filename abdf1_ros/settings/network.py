@@ -56,7 +56,7 @@ from abdf1_ros.text import shown
 MODE_NAMES = tuple(dict.fromkeys(mode.name for mode in MODES))
 _Cell = TypeVar('_Cell', int, str, bool)
 POLLING_MODES = tuple(mode.polling for mode in MODES if mode.polling)
-_HOST = re.compile(r'(?P<scheme>\w+://)?(?P<host>(?!tcp:)[\w.-]+?)(?P<port>:\d{2,5})?')
+_HOST = re.compile(r'(?P<scheme>\w+://)?(?P<host>(?!tcp:)[\w.-]+?)(?P<port>:[0-9]{2,5})?')
 PLC_TYPES = tuple(entry.value for entry in FAMILIES)
 # Schemes of the URLs of device servers; each has a module in ``ports``.
 DEVICE_SERVERS = ('socket', 'rfc2217')

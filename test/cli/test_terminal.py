@@ -27,6 +27,7 @@ from unittest.mock import Mock
 from abdf1_ros.cli import terminal
 from abdf1_ros.errors import PortLost
 from abdf1_ros.problems import ConfigurationError, Problem
+from abdf1_ros.settings.network import load_network
 import pytest
 from support.cases import for_all
 
@@ -268,6 +269,40 @@ def test_option_that_may_be_meant(
     assert ending.value.code == 2
     assert capsys.readouterr().err == (f'tool read: error: unrecognized arguments: {meant}\n'
                                        '"tool read --help" lists the arguments\n')
+
+
+@pytest.mark.parametrize(('given', 'named'), [
+    (['--count', '１'], '"１" is U+FF11 FULLWIDTH DIGIT ONE, not "1"'),
+    (['--count', '−5'], '"−" is U+2212 MINUS SIGN, not "-"'),
+    (['−−count', '5'], '"−" is U+2212 MINUS SIGN, not "-"'),
+    (['--kind', '“SLC”'], '"“" is U+201C LEFT DOUBLE QUOTATION MARK, not """'),
+    (['--kind', 'SLC\xa0'], '"\\xa0" is U+00A0 NO-BREAK SPACE, not " "'),
+    (['--kind', 'Öl'], '(choose from SLC)')])
+def test_character_that_was_pasted_is_named(
+        given: list[str], named: str, capsys: pytest.CaptureFixture[str]) -> None:
+    parser = terminal.command_parser('tool', None)
+    read = parser.add_subparsers().add_parser('read', allow_abbrev=False)
+    read.add_argument('--count', type=terminal.whole_option)
+    read.add_argument('--kind', choices=['SLC'])
+    with pytest.raises(SystemExit):
+        parser.parse_args(['read', *given])
+    assert capsys.readouterr().err.splitlines()[0].replace("'SLC')", 'SLC)').endswith(named)
+
+
+def test_character_that_was_pasted_is_named_in_faults_and_names_of_files(
+        capsys: pytest.CaptureFixture[str]) -> None:
+    def fail() -> int:
+        raise ConfigurationError([Problem('N7:0', '"−5" is not a valid int16'),
+                                  Problem('a', 'character 1 is U+2212 MINUS SIGN: "−"')])
+
+    assert terminal.run_command('plc', fail) == terminal.EXIT_USAGE
+    assert capsys.readouterr().err.splitlines() == [
+        'plc: N7:0: "−5" is not a valid int16; "−" is U+2212 MINUS SIGN, not "-"',
+        'plc: a: character 1 is U+2212 MINUS SIGN: "−"']  # it is named already
+    for name in ('“net.csv”', 'net.csv\xa0'):
+        assert 'not ' in terminal.reason_of(name, OSError(errno.ENOENT, 'No such file'))
+        with pytest.raises(ConfigurationError, match='U[+]'):
+            load_network(name)
 
 
 @pytest.mark.parametrize(('nargs', 'name', 'given', 'hint'), [

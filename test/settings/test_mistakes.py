@@ -240,6 +240,9 @@ PORT = ('should be a number from 1, a device path such as /dev/ttyUSB0, socket:/
     ('Com_Port\nsocket://192.168.0.9\n', [
         f'!2:1 (Com_Port): Com_Port = "socket://192.168.0.9" {PORT}; the port is missing, as in '
         'socket://192.168.0.9:4001']),
+    ('Com_Port\nsocket://plc:４001\n', [
+        f'!2:1 (Com_Port): Com_Port = "socket://plc:４001" {PORT}; "plc ports" lists the devices; '
+        'character 14 is U+FF14 FULLWIDTH DIGIT FOUR, not "4"']),
     ('Com_Port\ntcp:4001\n', [
         f'!2:1 (Com_Port): Com_Port = "tcp:4001" {PORT}; "plc ports" lists the devices']),
     ('Com_Port,Share\n1,tcp:+4501\n', [
