@@ -525,7 +525,7 @@ class Demo(Stage):
             raise Missed('without a reset ROS should have no control')
 
     def _are_all_ok(self) -> bool:
-        """Tell whether all is well, but for what others on the network publish."""
+        """Tell whether all statuses are OK except ``topics``: other nodes may publish there."""
         return all(status.level == _OK for name, status in self._watcher.statuses.items()
                    if name != 'topics')
 

@@ -38,7 +38,7 @@ class Decider(Enum):
 
     POLL = 'one poll of the station'
     HALF_DUPLEX = 'one poll, as in half duplex'
-    OTHER_CHECK = 'one command with the other check'
+    OTHER_CHECK = 'one command with another check'
     NEIGHBOUR = 'one poll of another station'
     LATER = 'one second more for the reply'
     ECHOES = 'echoes with and without the bytes 11, 13 and FF hex'
@@ -87,13 +87,13 @@ RULES = (
          '--own-station', Traces(SLAVE)),
     Rule('a message with the check of Modbus RTU',
          lambda t: t.is_modbus,
-         'a device that speaks Modbus RTU is at the other end',
+         'a device that speaks Modbus RTU is at the far end',
          'set the channel of the PLC to DF1, or find the right cable',
          Traces(characters=8, first=bytes.fromhex('01 03 00 00 00 0A C5 CD'))),
     Rule('printable text, and nothing else',
          lambda t: t.is_text,
-         'text comes, and no DF1: the channel of the PLC is in User (ASCII) mode, or the other '
-         'end is a reader, a scale, a modem or a login prompt',
+         'text comes, and no DF1: the channel of the PLC is in User (ASCII) mode, or the far end '
+         'is a reader, a scale, a modem or a login prompt',
          'set the channel to DF1, or find the right cable',
          Traces(characters=13, first=b'TEMP 23.4 C\r\n')),
     Rule('replies to our commands, with another number in place of ours',
@@ -107,12 +107,12 @@ RULES = (
          'replies to number {t.foreign} come, to commands that are not ours: a second device has '
          'the same port, by a passive splitter',
          'take it off; it may use Share', Traces(PEER, foreign=0)),
-    Rule('half duplex: polls are answered; commands are, with the other check only',
+    Rule('half duplex: polls are answered; commands are, but only with another check',
          lambda t: t.mode.is_master and t.takes_other_check is True,
          'station {t.on_line} answers polls, and takes commands with {t.other_check} only',
          'Error_Code is {t.other_check} in net.csv, --check {t.other_check} of "plc"',
          Traces(polls=1, polls_answered=1, takes_other_check=True)),
-    Rule('full duplex: DLE NAK to all messages, but not with the other check',
+    Rule('full duplex: DLE NAK to all messages, but not with another check',
          lambda t: t.takes_other_check is True,
          'the PLC answers DLE NAK to all with {t.check.value}, and takes commands with '
          '{t.other_check}',
@@ -146,7 +146,7 @@ RULES = (
     Rule('full duplex: DLE NAK to all messages',
          lambda t: t.naks > 0 and not t.acks,
          'the PLC answers DLE NAK to all: is Error_Code right?',
-         'try the other Error_Code, {t.other_check}', Traces(PEER, naks=4), Decider.OTHER_CHECK),
+         'try Error_Code {t.other_check}', Traces(PEER, naks=4), Decider.OTHER_CHECK),
     Rule('a reply after Cmd_Timeout',
          lambda t: t.late > 0,
          'station {t.station} takes commands, but does not reply in time: a reply came after '
@@ -203,12 +203,12 @@ RULES = (
     Rule('half duplex: polls are answered, commands are not',
          lambda t: t.mode.is_master and t.polls_answered > 0,
          'station {t.on_line} answers polls, but no command: is Error_Code right?',
-         'try the other Error_Code, {t.other_check}',
+         'try Error_Code {t.other_check}',
          Traces(polls=1, polls_answered=1), Decider.OTHER_CHECK),
     Rule('full duplex: DLE ENQ is answered, messages are not',
          lambda t: t.enquiries > 0 and not t.acks,
          'a full-duplex port answers, but takes no command for station {t.station}',
-         '"plc scan 0-63 --peer" shows which stations reply; then try the other Error_Code, '
+         '"plc scan 0-63 --peer" shows which stations reply; then try Error_Code '
          '{t.other_check}', Traces(PEER, enquiries=4, characters=8, first=_ONE)),
     Rule('Mode Slave: the master polls us, and no reply comes',
          lambda t: t.polled,

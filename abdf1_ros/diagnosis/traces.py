@@ -77,7 +77,7 @@ class Traces:
 
     What a question has shown is None if it was not asked:
 
-    - ``takes_other_check``: the station takes commands with the other check.
+    - ``takes_other_check``: the station takes commands with BCC where we have CRC, or the reverse.
     - ``is_polled_port``: a full-duplex port answers polls of half duplex.
     - ``neighbour``: another station that was asked, ``neighbour_answers``: whether it answers.
     - ``swallowed``: bytes with which an echo does not come back, though it does without them.
@@ -125,12 +125,12 @@ class Traces:
 
     @property
     def other_check(self) -> str:
-        """Return the name of the other check."""
+        """Return the name of the check that we do not use: BCC for CRC, CRC for BCC."""
         return str(_other(self.check).value)
 
     @property
     def is_df1(self) -> bool:
-        """Return True if the other end has answered with symbols of DF1."""
+        """Return True if the far end has answered with symbols of DF1."""
         return bool(self.neighbour_answers) or sum((
             self.replies, self.acks, self.naks, self.enquiries, self.polls_answered,
             self.naks_to_polls, self.foreign_polls)) > 0
@@ -284,7 +284,7 @@ def traces_of(chunks: Sequence[Chunk], asked: LineAsked, *, echoes: bool = False
     """
     Return what the bytes of a line have shown.
 
-    Damaged messages that are right with the other check show that the far end uses that check.
+    If messages are damaged with our check and right with ``other_check``, the far end uses that.
     """
     traces = _SymbolCount(chunks, asked, echoes=echoes).traces
     if traces.damaged and not traces.replies:

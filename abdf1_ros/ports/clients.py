@@ -310,7 +310,7 @@ class ClientsThread(threading.Thread, Generic[_Talk]):
                 client.came_after = now
         except OSError:
             self._drop(port, client)
-        except Exception as error:  # a bug must not end the others
+        except Exception as error:  # a bug must end only this client
             self._drop(port, client)
             self._on_fault(error)
 

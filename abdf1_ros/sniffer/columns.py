@@ -21,7 +21,7 @@ import re
 
 WORD_OFFSET = 7  # digits before the words of hexdump and od
 _OTHER_OFFSET = 8  # digits before the bytes of xxd and hexdump -C, which are hexadecimal
-_MANY_LINES = 8  # in which a number rises, which a byte would not do so often
+_MANY_LINES = 8  # lines in which a number rises; a byte does not rise in all of them
 
 
 class Unfit(ValueError):

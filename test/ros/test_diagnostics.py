@@ -638,7 +638,7 @@ def test_link_tells_cause_and_next_step_of_a_missing_answer(bench: Bench,
     peer.driver.stations.lost(1, NOW)
     peer.driver.counters.naks_received = 4
     assert cause_of(peer) == ('the PLC answers DLE NAK to all: is Error_Code right?',
-                              'try the other Error_Code, BCC')
+                              'try Error_Code BCC')
     listening = make_bench('speed,Read,N7:0,1,SLC,1000', mode='Listen')
     listening.driver.stations.lost(1, NOW)
     assert cause_of(listening) == ('', '')

@@ -234,7 +234,7 @@ def conclusion(traces: Mapping[LineSettings, Traces]) -> Iterator[str]:
 
 def _takes_other_check(traces: Mapping[LineSettings, Traces],
                        settings: LineSettings) -> bool | None:
-    """Return False if commands with the other check were refused in the same way."""
+    """Return False if commands were refused with CRC and with BCC alike."""
     other = traces.get(replace(settings, check=traces[settings].other_check))
     is_refused = other is not None and not other.acks and (
         other.naks + other.polls_answered > 0)

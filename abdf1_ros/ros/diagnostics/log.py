@@ -227,7 +227,7 @@ class NodeLog:
 
 
 def first_line(entries: Sequence[tuple[LoggingSeverity, str]]) -> str:
-    """Return the first of several entries, and the number of the others."""
+    """Return the first of several entries, and how many more there are."""
     if not entries:
         return 'nothing to say'
     others = len(entries) - 1

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Values of parameters: which can be used, and how the others should be written."""
+"""Values of parameters: which can be used, and how to write one that cannot."""
 
 from __future__ import annotations
 

@@ -93,8 +93,8 @@ class LivingPublishers:
     def liveliness_changed(self, event: LivelinessChanged) -> None:
         """Record publishers that do not keep their lease, or keep it again."""
         self._dead = event.not_alive_count
-        # If DDS drops a dead publisher, it is neither dead nor connected any more. The event of
-        # the other subscription may come later.
+        # If DDS drops a dead publisher, it is neither dead nor connected any more. The event
+        # ``matched`` of that publisher may come later.
         self._matched = min(self._matched, self._connected())
         self._judge(self.alive)
 

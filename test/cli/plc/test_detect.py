@@ -191,8 +191,8 @@ def test_full_duplex_port_with_another_station_is_heard_all_the_same(tmp_path: P
     assert (seen.characters, seen.enquiries, seen.naks) == (2, 1, 0)
     assert [*conclusion(search.traces)] == [
         '9600 baud, full duplex, CRC: a full-duplex port answers, but takes no command for '
-        'station 5. Next: "plc scan 0-63 --peer" shows which stations reply; then try the other '
-        'Error_Code, BCC']
+        'station 5. Next: "plc scan 0-63 --peer" shows which stations reply; then try '
+        'Error_Code BCC']
 
 
 def test_characters_of_before_an_echo_was_seen_are_no_trace(

@@ -249,7 +249,7 @@ def test_bytes_that_do_not_pass_are_found_by_echoes(
 @pytest.mark.parametrize(('sent', 'text', 'first'), [
     (b'TEMP 23.4 C\r\n', 'text comes, and no DF1: the channel of the PLC is in User (ASCII) mode',
      '54 45 4D 50 20 32 33 2E 34 20 43 0D 0A '),
-    (bytes.fromhex('01 83 02 C0 F1'), 'a device that speaks Modbus RTU is at the other end',
+    (bytes.fromhex('01 83 02 C0 F1'), 'a device that speaks Modbus RTU is at the far end',
      '01 83 02 C0 F1 ')])
 def test_text_and_modbus_are_named_and_shown(
         tmp_path: Path, capsys: Output, sent: bytes, text: str, first: str) -> None:
