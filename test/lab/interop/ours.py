@@ -45,14 +45,18 @@ from cases import Case, same, Values
 from plain import decoded, encoded, PlainLine, PlainPlc, SIZES, split
 from std_msgs.msg import String
 from support.odd_device import OddDevice, Wiring
-from support.ros import Inbox, Observer, Process, ros_args, write_csv
+from support.ros import Inbox, latched_qos, Observer, Process, ros_args, write_csv
 
 Device = TypeVar('Device', bound=OddDevice)
 
 OURS, THEIRS = 5, 1  # stations of the node, and of what answers it
 BESIDE, VIA = 2, 7  # a second station on the line, and a gateway
 PATIENCE = 5.0  # s until a value has to be there
+BAUD = 19200
 BEAT = Case('N7:240', [0], [0])  # the heartbeat of a node that shares its line
+BEAT_TIME = 0.2  # s between two beats, its Period
+CLOCK = Case('N7:250', [0], [0])  # the milliseconds of the PLC, as far as a word goes
+_CLOCK_TURN = 0x8000
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +66,8 @@ class Setup:
 
     ``access`` is the cell Access of the node's rows; ``serves`` tells that they are Serve.
     ``share`` is the cell Share: guests have these ``rights``, and the node has a heartbeat.
-    ``via`` is the gateway of the stations. In Mode Master there is a second station.
+    ``via`` is the gateway of the stations. In Mode Master there is a second station. ``is_paced``
+    tells that the line is as slow as BAUD makes it.
     """
 
     family: PlcType
@@ -76,6 +81,7 @@ class Setup:
     share: str = ''
     rights: str = 'Write'
     via: int | None = None
+    is_paced: bool = False
 
 
 class End(Protocol):
@@ -127,7 +133,7 @@ class PlcEnd:
             stations_of([self._plc, other], setup.check)), checksum=setup.check,
                           duplex=Duplex.FULL if is_peer else Duplex.HALF,
                           counters=self._plc.counters)
-        self._link = LinkThread(machine, SerialEndpoint(PortSettings(setup.port, 19200)).open)
+        self._link = LinkThread(machine, SerialEndpoint(PortSettings(setup.port, BAUD)).open)
         self._link.start()
 
     def give(self, case: Case, values: Values) -> None:
@@ -151,6 +157,10 @@ class PlcEnd:
         self._link.stop()
 
 
+def _milliseconds() -> int:
+    return int(time.monotonic() * 1000) % _CLOCK_TURN
+
+
 def wired(kind: type[Device], setup: Setup) -> Device:
     """Return a device that is station 1, beside another, or with it behind a gateway."""
     if setup.mode == 'Peer':
@@ -171,7 +181,11 @@ class PlainEnd:
         for case in setup.cases:  # the other station has other values at the same addresses
             number, at = self._plc.place(case.address)
             self._plc.files[BESIDE][number][at:at + 84] = 84 * b'\x55'
-        self._line = PlainLine(setup.port, self._plc)
+        self._line = PlainLine(setup.port, self._plc, 10 / BAUD if setup.is_paced else 0.0)
+
+    def run_clock(self) -> None:
+        """Keep the milliseconds of this host in CLOCK."""
+        self._plc.scan = lambda: self.give(CLOCK, [_milliseconds()])
 
     def give(self, case: Case, values: Values) -> None:
         """Put values into the PLC's files."""
@@ -207,6 +221,24 @@ def wanted(values: Values, kind: ValueType) -> Values:
     return values
 
 
+class RowAge:
+    """How old (s) the newest value of CLOCK has become: as ``promised``, and as was ``seen``."""
+
+    def __init__(self, promised: float) -> None:
+        self.promised = promised
+        self.seen = 0.0
+        self.messages = 0
+        self._read_at: float | None = None
+
+    def take(self, value: int) -> None:
+        """Take a value that comes now: until now the last one was the newest."""
+        now = time.monotonic()
+        if self._read_at is not None:
+            self.seen = max(self.seen, now - self._read_at)
+        self._read_at = now - (_milliseconds() - value) % _CLOCK_TURN / 1000
+        self.messages += 1
+
+
 class NodeEnd:
     """The node, in Mode Peer as a rule; its rows are Serve, or it asks station 1."""
 
@@ -229,7 +261,7 @@ class NodeEnd:
             setup.folder / 'net.csv',
             'Mode,Station,PLC_Type,Error_Code,Com_Port,Baud,Timeout,Cmd_Timeout,Share,'
             'Share_Access',
-            [f'{setup.mode},{OURS},{setup.family.value},{setup.check.value},{setup.port},19200,'
+            [f'{setup.mode},{OURS},{setup.family.value},{setup.check.value},{setup.port},{BAUD},'
              f'500,5000,{setup.share},{setup.rights}'])
         table = write_csv(
             setup.folder / 'map.csv',
@@ -280,6 +312,16 @@ class NodeEnd:
         while time.monotonic() < end and not (inbox and same(expected, self._values(inbox))):
             self._spin(0.05)
         return self._values(inbox) if inbox else None
+
+    def watch_age(self) -> RowAge:
+        """Return the age of the row CLOCK from now on, as this process gets it."""
+        topic = f'/abdf1/read/{self._cases[CLOCK.address]}'
+        publisher, = self._observer.node.get_publishers_info_by_topic(topic)
+        age = RowAge(publisher.qos_profile.deadline.nanoseconds / 1e9)
+        self._observer.node.create_subscription(
+            MESSAGES[ValueType.INT16], topic, lambda message: age.take(message.data[0]),
+            latched_qos())
+        return age
 
     @staticmethod
     def _values(inbox: Inbox) -> Values:

@@ -23,12 +23,13 @@ outputs in slot 2; no other module, so word 0 of the whole image is word 0 of th
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 import os
 import re
 import select
 import struct
 import threading
+import time
 import tty
 
 from support.odd_device import OddDevice, Wiring
@@ -61,11 +62,16 @@ def split(address: str) -> tuple[str, int, int, int, int | None]:
 
 
 class PlainPlc(OddDevice):
-    """A device whose stations have files: ``files[station][number]``, of type ``letters``."""
+    """
+    A device whose stations have files: ``files[station][number]``, of type ``letters``.
+
+    ``scan`` is called before each command; it may change words, as the PLC's program does.
+    """
 
     def __init__(self, wiring: Wiring, station: int = 1, nodes: Iterable[int] = ()) -> None:
         super().__init__(wiring, station, nodes)
         self.is_plc5 = False
+        self.scan: Callable[[], None] = lambda: None
         self.letters = {number: letters for letters, number in FIXED.items()}
         self.files: defaultdict[int, defaultdict[int, bytearray]] = defaultdict(
             lambda: defaultdict(lambda: bytearray(_ELEMENTS * max(SIZES.values()))))
@@ -89,6 +95,7 @@ class PlainPlc(OddDevice):
                    0x68: self._typed_read}.get(function)
         if handler is None or (function < 0x80) is not self.is_plc5:
             return _REFUSED, b''
+        self.scan()
         try:
             return 0, handler(self.files[node], fields)
         except LookupError:
@@ -223,12 +230,21 @@ def decoded(letters: str, data: bytes) -> list[float] | str:
 
 
 class PlainLine:
-    """The thread that puts a device at a port."""
+    """
+    The thread that puts a device at a port.
 
-    def __init__(self, port: str, device: OddDevice) -> None:
+    With ``char_time`` (s) each byte takes so long, first of what comes, then of the answer, as in
+    half duplex; so the line is never faster than a real one.
+    """
+
+    _CHUNK = 8  # bytes that a UART hands over at a time
+
+    def __init__(self, port: str, device: OddDevice, char_time: float = 0.0) -> None:
         self._descriptor = os.open(port, os.O_RDWR | os.O_NOCTTY)
         tty.setraw(self._descriptor)
         self._device = device
+        self._char_time = char_time
+        self._free = 0.0
         self._is_over = threading.Event()
         self._thread = threading.Thread(target=self._serve)
         self._thread.start()
@@ -238,9 +254,17 @@ class PlainLine:
         poll.register(self._descriptor, select.POLLIN)
         while not self._is_over.is_set():
             if poll.poll(20):
-                self._device.receive_data(os.read(self._descriptor, 4096), 0.0)
-                if data := self._device.data_to_send():
-                    os.write(self._descriptor, data)
+                data = os.read(self._descriptor, 4096)
+                self._free = max(self._free, time.monotonic()) + len(data) * self._char_time
+                self._device.receive_data(data, 0.0)
+                self._send(self._device.data_to_send())
+
+    def _send(self, data: bytes) -> None:
+        for at in range(0, len(data), self._CHUNK):
+            chunk = data[at:at + self._CHUNK]
+            self._free += len(chunk) * self._char_time
+            time.sleep(max(0.0, self._free - time.monotonic()))
+            os.write(self._descriptor, chunk)
 
     def close(self) -> None:
         """End the thread."""

@@ -822,14 +822,15 @@ def main() -> int:
         if options.place:
             all_good &= through_places(run, options)
         elif options.sessions is not None:
-            for mode in ('Peer', 'Master') if run.ours == 'plc' and run.reach else ():
+            is_for_all = run.ours == 'plc' and run.reach and run.check is Checksum.CRC
+            for mode in ('Peer', 'Master') if is_for_all else ():
                 tally = crowd_at_place(run, mode, options.sessions, options.seconds)
-                print(f'{run.text}, {mode}: {tally}', flush=True)
+                print(f'{run.text}, {mode}:\n{tally}', flush=True)
                 all_good &= tally.is_good
         elif options.share is not None:
             for mode in ('Peer', 'Master') if run.ours == 'plc' else ():
                 tally = share_line(run, mode, options.share)
-                print(f'{run.text}, {mode}: {tally}', flush=True)
+                print(f'{run.text}, {mode}:\n{tally}', flush=True)
                 all_good &= tally.is_good
         elif options.conform is None:
             all_good &= show(run.text, carry_out(run, options.save))

@@ -32,12 +32,13 @@ import time
 from typing import Any
 
 from cases import Case, same, Values
-from ours import BEAT, NodeEnd, PlcEnd, Setup
+from ours import BEAT, BEAT_TIME, CLOCK, End, NodeEnd, PlainEnd, PlcEnd, RowAge, Setup
 
 _GUESTS = Case('N7:0', [0.0] * 60, []), Case('N7:100', [0.0] * 60, [])
 OWN = Case('N7:200', [1, 2, 3, 4], [4112, -1, 16, 0])
 _WORDS = 12  # of a session
 PATIENCE = 10.0  # s until words are written: AbDf1 does not say when
+_REST = 3.0  # s between two rounds of a session
 _LONGEST_BEAT = 1.0  # s between two changes of a heartbeat of 200 ms, on a busy machine
 
 
@@ -49,7 +50,8 @@ class Tally:
     ``failures`` are commands that the product gave up, that were refused, or that came late
     (AbDf1 tells nobody of a refused write: the word is as it was, and it reads that), ``ours`` the
     values that ROS wrote and read meanwhile, ``wrong_ours`` those that were wrong;
-    ``longest_beat`` is in s.
+    ``longest_beat`` is in s, ``lost_beats`` counts those that the PLC did not get. ``age`` is that
+    of a row of the bridge.
     """
 
     right: int = 0
@@ -59,12 +61,30 @@ class Tally:
     wrong_ours: int = 0
     beats: int = 0
     longest_beat: float = 0.0
+    lost_beats: int = 0
+    seconds: float = 0.0
+    age: RowAge | None = None
 
     @property
     def is_good(self) -> bool:
-        """Tell whether nobody got a wrong value, and all were at work."""
-        return bool(self.right and self.ours) and not self.wrong and not self.wrong_ours \
-            and self.longest_beat < _LONGEST_BEAT
+        """Tell whether nobody got a wrong value, all were at work, and no promise was broken."""
+        return bool(self.right and self.ours) and not (
+            self.wrong or self.wrong_ours or self.lost_beats) \
+            and self.longest_beat < _LONGEST_BEAT \
+            and (self.age is None or 0 < self.age.seen <= self.age.promised)
+
+    def __str__(self) -> str:
+        """Return all of it in lines."""
+        lines = [
+            f'guests: {self.right} values right, {self.wrong} wrong, {self.failures} rounds that '
+            'failed and said so',
+            f'ROS: {self.ours} values right, {self.wrong_ours} wrong',
+            f'heartbeat: {self.beats} beats in {self.seconds:.0f} s, each {BEAT_TIME} s, '
+            f'{self.lost_beats} lost; longest pause {self.longest_beat:.2f} s']
+        if self.age is not None:
+            lines.append(f'row of the bridge, {self.age.messages} messages: at most '
+                         f'{self.age.promised:.2f} s old as promised, {self.age.seen:.2f} s seen')
+        return '\n'.join(f'  {line}' for line in lines)
 
 
 def share(setup: Setup, lines: tuple[str, str], start: Callable[[Setup, str, ExitStack], Any],
@@ -105,18 +125,19 @@ def crowd(setup: Setup, lines: tuple[str, str], place: str, reach: Callable[[str
     """
     Let many sessions of a product write and read at one eip: place, each words of its own.
 
-    ``reach`` starts one at the host:port of ``place``. Each rests a second after each round, as
-    the line has time for few.
+    ``reach`` starts one at the host:port of ``place``. Each rests after each round, as the line,
+    which is as slow as one of BAUD, has time for few. The PLC shares no code with the package.
     """
     cases = [Case(f'N7:{_WORDS * number}', [0.0] * _WORDS, []) for number in range(sessions)]
-    plc = PlcEnd(replace(setup, port=lines[1], cases=(*cases, OWN, BEAT)))
+    plc = PlainEnd(replace(setup, port=lines[1], cases=(*cases, OWN, BEAT, CLOCK), is_paced=True))
     stack.callback(plc.close)
-    node = NodeEnd(replace(setup, port=lines[0], cases=(OWN,)))
+    plc.run_clock()
+    node = NodeEnd(replace(setup, port=lines[0], cases=(OWN, CLOCK)))
     stack.callback(node.close)
     guests = [(reach(place), case) for case in cases]
     for guest, _ in guests:
         stack.callback(guest.close)
-    tally, ended = Tally(), Event()
+    tally, ended = Tally(seconds=seconds, age=node.watch_age()), Event()
     end = time.monotonic() + seconds
     with ThreadPoolExecutor(sessions + 1) as pool:
         done = [pool.submit(_until, end, guest, case, plc) for guest, case in guests]
@@ -128,17 +149,17 @@ def crowd(setup: Setup, lines: tuple[str, str], place: str, reach: Callable[[str
     return replace(tally, **counts)
 
 
-def _until(end: float, guest: Any, case: Case, plc: PlcEnd) -> Counter[str]:
+def _until(end: float, guest: Any, case: Case, plc: End) -> Counter[str]:
     """Do rounds until ``end``."""
     counts: Counter[str] = Counter()
     chance = random.Random(case.address)
     while time.monotonic() < end:
         counts += work(guest, case, plc, 1, chance)
-        time.sleep(1.0)
+        time.sleep(_REST)
     return counts
 
 
-def _write_own(node: NodeEnd, plc: PlcEnd, tally: Tally, is_over: Callable[[], bool]) -> None:
+def _write_own(node: NodeEnd, plc: End, tally: Tally, is_over: Callable[[], bool]) -> None:
     """Let ROS write and read values of its own meanwhile."""
     while not is_over():
         for values in (OWN.before, OWN.after):
@@ -148,7 +169,7 @@ def _write_own(node: NodeEnd, plc: PlcEnd, tally: Tally, is_over: Callable[[], b
             tally.wrong_ours += not good
 
 
-def work(guest: Any, case: Case, plc: PlcEnd, rounds: int,
+def work(guest: Any, case: Case, plc: End, rounds: int,
          chance: random.Random | None = None) -> Counter[str]:
     """
     Write values of chance, look at them in the PLC, and read them again.
@@ -184,12 +205,13 @@ def _are_among(known: Sequence[Values], *seen: Values) -> bool:
                for words in seen for word, *entries in zip(words, *known, strict=True))
 
 
-def _watch(plc: PlcEnd, tally: Tally, ended: Event) -> None:
+def _watch(plc: End, tally: Tally, ended: Event) -> None:
     """Measure the time between two beats."""
     last, since = plc.take(BEAT, []), time.monotonic()
     while not ended.wait(0.01):
         now = time.monotonic()
         if (value := plc.take(BEAT, [])) != last:
+            tally.lost_beats += bool(tally.beats) and value != [last[0] % 32767 + 1]
             tally.longest_beat = max(tally.longest_beat, (now - since) * bool(tally.beats))
             tally.beats += 1
             last, since = value, now

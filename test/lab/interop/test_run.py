@@ -114,9 +114,11 @@ def test_a_long_is_the_same_with_both_of_its_words_alone(run: ModuleType) -> Non
 
 
 def test_sessions_of_a_place_share_the_line_of_a_node_at_work(run: ModuleType) -> None:
-    entry, _ = run.our_runs(None)
+    entry, = (each for each in run.our_runs(None) if each.check is Checksum.CRC)
     tally = run.crowd_at_place(entry, 'Peer', 3, 4.0)
-    assert replace(tally, longest_beat=0.0).is_good and tally.beats > 2, tally
+    # the pause between two beats is that of the host, where it is busy
+    assert replace(tally, longest_beat=0.0, age=None).is_good and tally.beats > 2, str(tally)
+    assert tally.age.messages > 2 and tally.age.promised == pytest.approx(1.54, abs=0.1)
     assert tally.right >= 3 * 12 and tally.failures == 0
 
 
