@@ -68,7 +68,7 @@ from abdf1_ros.pccc.families import FAMILIES, parse_range
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.processor import Processor
-from abdf1_ros.pccc.spellings import family_name
+from abdf1_ros.pccc.spellings import family_name, processor_name
 from abdf1_ros.pccc.steps import AddressedValues
 from abdf1_ros.pccc.strings import is_string_element
 from abdf1_ros.pccc.values import Values, ValueType, WordOrder
@@ -115,9 +115,12 @@ class Client(BlockingClient):
     sent.
     """
 
-    def __init__(self, port: str | os.PathLike[str], *, plc_type: str | None = None,
-                 station: int = 1, duplex: str = 'full', baud: int = 9600, parity: str = 'None',
-                 check: str = 'CRC', own_station: int = 5, processor: str | None = None,
+    __slots__ = 'station', '_access', '_kind', '_kinds', '_own_station'
+
+    def __init__(self, port: str | os.PathLike[str], *, plc_type: str | PlcType | None = None,
+                 station: int = 1, duplex: str = 'full', baud: int = 9600,
+                 parity: str | None = None, check: str = 'CRC', own_station: int = 5,
+                 processor: str | Processor | None = None,
                  access: str | None = None, timeout: float = 1.0, cmd_timeout: float = 1.0,
                  retries: int = 3, trace: str | os.PathLike[str] | None = None,
                  logger: logging.Logger = LOG) -> None:
@@ -127,9 +130,9 @@ class Client(BlockingClient):
         self._kind: tuple[PlcType, Processor | None] | None = None
         if plc_type is not None:
             families = one_of({family.value: family for family in FAMILIES}, family_name)
+            processors = one_of({known.value: known for known in Processor}, processor_name)
             self._kind = _choice('plc_type', families, plc_type), (
-                None if processor is None else _choice(
-                    'processor', member_of(Processor), processor))
+                None if processor is None else _choice('processor', processors, processor))
         elif processor is not None:
             raise FormatError('processor needs plc_type; without both the PLC is asked')
         from abdf1_ros.settings import BAUD_RATES  # one list for files and programs
@@ -137,7 +140,8 @@ class Client(BlockingClient):
         if speed not in BAUD_RATES:
             raise FormatError(f'baud {speed} should be one of {", ".join(map(str, BAUD_RATES))}')
         settings = PortSettings(_port(port), speed,
-                                parity=_choice('parity', _PARITY, parity))
+                                parity=_choice('parity', _PARITY, (
+                                    'None' if parity is None else parity)))
         times = _whole('retries', retries, 0, _MOST_RETRIES)
         mode = _choice('duplex', _DUPLEX, duplex)
         own = _whole('own_station', own_station, 0, MAX_STATION)
@@ -243,6 +247,8 @@ class Client(BlockingClient):
               *, word_order: str = 'Low', station: int | None = None) -> None:
         """Write one or more values from an address on; return when the PLC has confirmed all."""
         values = values_of(values)
+        if isinstance(kind, Real):
+            raise FormatError(f'kind {kind} should be a text; several values are one list')
         is_packed = isinstance(values, str) and kind is not None and not is_string_element(
             text_of('address', address))
         length = max(1, (len(values) + 1) // 2) if is_packed else \
@@ -310,7 +316,8 @@ class Client(BlockingClient):
                 station: int | None) -> tuple[int, AddressedValues]:
         number = self._of(station)
         if isinstance(address, list | tuple):
-            raise FormatError('read takes one address; read_many takes several')
+            raise FormatError(
+                f'address {shown(repr(address))} should be one text; read_many reads several')
         place, count = text_of('address', address), _whole('length', length, 1)
         chosen = None if kind is None else _choice('kind', member_of(ValueType), kind)
         order = _choice('word_order', member_of(WordOrder), word_order)
@@ -372,8 +379,9 @@ def _seconds(name: str, value: float) -> float:
 
 
 def _choice(name: str, kind: ValueKind[_T], value: object) -> _T:
-    """Return the meaning of a value, which may have any letter case."""
-    found = kind.read(value) if isinstance(value, str) else None
+    """Return the meaning of a text in any letter case, or of what ``identify`` returns."""
+    text = value.value if isinstance(value, PlcType | Processor) else value
+    found = kind.read(text) if isinstance(text, str) else None
     if found is None:
         raise FormatError(f'{name} {shown(repr(value))} should be {kind.right}')
     return found

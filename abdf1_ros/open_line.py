@@ -24,10 +24,12 @@ from numbers import Real
 import os
 from queue import Empty, SimpleQueue
 import random
+import sys
 from threading import current_thread
 import time
 from types import TracebackType
-from typing import Any, Generic, Self, TYPE_CHECKING, TypeAlias, TypeVar
+from typing import Any, cast, Generic, NoReturn, Self, TYPE_CHECKING, TypeAlias, TypeVar
+import warnings
 
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.frames import Duplex, MAX_LINK_DATA
@@ -179,6 +181,8 @@ _ours: dict[str, Holder] = {}  # by line, what this program has open
 class _Closes:
     """Something that the end of ``with`` closes."""
 
+    __slots__ = ()
+
     def close(self) -> None:
         """Close it."""
         raise NotImplementedError
@@ -203,6 +207,8 @@ class OpenLine(_Closes):
     written or the mode only listens.
     """
 
+    is_open = False
+
     def __init__(self, mode: LineMode, line: LinkSettings, port: PortSettings,
                  stations: ActiveStationList | None = None, plc_type: PlcType = PlcType.PLC5,
                  trace: str | None = None, logger: logging.Logger = LOG,
@@ -211,7 +217,9 @@ class OpenLine(_Closes):
             raise ConfigurationError([Problem('Mode', (
                 f'in Mode {mode.name} nothing may be sent on this line; "plc log" has its '
                 'values, "sniff" its traffic'))])
-        self.log = logger
+        self.log = logger_of(logger)
+        self._process = os.getpid()
+        self.port_name = port.name
         self._entries: deque[_Entry] = deque()
         self._lost = self._lost_reported = 0  # entries
         self._mode, self._settings = mode, line
@@ -233,6 +241,16 @@ class OpenLine(_Closes):
         self._holder = _ours[self._line] = Holder(lambda: mode.longest_transaction(
             line, self.line_model.transaction_time(MAX_LINK_DATA, MAX_LINK_DATA)))
         self._link.start()
+        self.is_open = True
+
+    @property
+    def state(self) -> str:
+        """Return what the port is doing, or why it is not open."""
+        if os.getpid() != self._process:
+            return 'another process has opened it; each process needs a client of its own'
+        if sys.is_finalizing():
+            return 'this program ends'
+        return self._link.state.text
 
     @property
     def echoes(self) -> bool:
@@ -255,6 +273,8 @@ class OpenLine(_Closes):
     def start(self, station: int, work: Steps[_Result],
               pending: Pending[_Result] | None = None) -> Pending[_Result]:
         """Begin to carry out a request; ``pending`` gets its result."""
+        if os.getpid() != self._process:
+            raise PortLost(self.state, sent=False)
         pending = pending or Pending()
         self._requests.add(station, work, pending.succeed, pending.fail)
         self._link.wake()
@@ -265,12 +285,13 @@ class OpenLine(_Closes):
         while not pending.wait(_GLANCE):
             self._log_entries()
             if not self._link.is_alive() and not pending.is_done:
-                raise PortLost(self._link.state.text)
+                raise PortLost(self.state)
         self._log_entries()
         return pending.result()
 
     def close(self) -> None:
         """End all requests, also waiting ones, and close the port."""
+        self.is_open = False
         self._holder.thread = current_thread()
         self._link.stop()
         self._port.close()  # the thread may not have come to it
@@ -329,8 +350,24 @@ class OpenLine(_Closes):
 class BlockingClient(_Closes):
     """What all clients have: their line, with the state of its stations, and its end."""
 
+    # Other names cannot be set: a later ``client.timeout = 5`` would have no effect.
+    __slots__ = '_line', '__weakref__'
+
     def __init__(self, line: OpenLine) -> None:
         self._line = line
+
+    def __repr__(self) -> str:
+        state = self._line.state if self._line.is_open else 'closed'
+        return f'<{type(self).__name__} of {self._line.port_name}: {state}>'
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError(f'a {type(self).__name__} cannot be pickled or copied, because it has the '
+                        'port; each process needs a client of its own')
+
+    def __del__(self) -> None:
+        if hasattr(self, '_line') and self._line.is_open:
+            warnings.warn(f'unclosed {self!r}', ResourceWarning,
+                          stacklevel=2, source=self)
 
     @property
     def counters(self) -> Counters:
@@ -411,10 +448,19 @@ def values_of(values: object) -> Sequence[float] | str:
     found = values.tolist() if hasattr(values, 'tolist') else values
     found = [found] if isinstance(found, Real) else found
     if isinstance(found, str) or (
-            isinstance(found, Sequence) and found and not isinstance(found, bytes)
+            isinstance(found, Sequence) and found and not isinstance(found, bytes | bytearray)
             and all(isinstance(value, Real) for value in found)):
         return found
-    raise FormatError(f'{shown(repr(values))} should be a number, several, or a text')
+    raise FormatError(f'{shown(repr(values))} should be a number (int, float, bool), a list of '
+                      'numbers, or a text (str)')
+
+
+def logger_of(value: object) -> logging.Logger:
+    if not isinstance(value, logging.Logger | logging.LoggerAdapter):
+        name = repr(value) if isinstance(value, str) else ''
+        raise FormatError(f'logger {shown(repr(value))} should be a logging.Logger, as from '
+                          f'logging.getLogger({name})')
+    return cast(logging.Logger, value)
 
 
 def path_of(name: str, value: object) -> str:

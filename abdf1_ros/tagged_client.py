@@ -58,6 +58,8 @@ class TaggedClient(BlockingClient):
     constructor raises ConfigurationError with every fault of the files.
     """
 
+    __slots__ = ('rows',)
+
     def __init__(self, net_file: str, map_file: str, trace: str | None = None,
                  logger: logging.Logger = LOG) -> None:
         # With Standard only the stations of a driver are polled, all the time.

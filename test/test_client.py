@@ -17,12 +17,16 @@
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, ExitStack, suppress
+import copy
 from functools import partial
 from inspect import signature
 from itertools import count
 import logging
 import math
+import multiprocessing
+import os
 from pathlib import Path
+import pickle
 import re
 import socket
 import subprocess
@@ -305,7 +309,8 @@ def test_entries_of_the_log_that_nothing_takes_are_counted(
     ('T4:0.ACC-T4:2.ACC', {}, 'not neighbours; an address each for T4:0.ACC, T4:1.ACC, T4:2.ACC, '
      'or the whole elements with T4:0, length=9$'),
     ('ST9:0-1', {}, 'each string needs its own address: ST9:0, ST9:1'),
-    (['N7:0'], {}, '^read takes one address; read_many takes several$'),
+    (['N7:0'], {}, r"^address \['N7:0'\] should be one text; read_many reads several$"),
+    ('N7:-1', {}, 'N7:-1 of station 1: write type, file, ":", element, as in N7:0'),
     ('F8:0', {'kind': 'int16'}, 'F8:0 can be float32'),
     ('N7:0', {'kind': 'int'}, "kind 'int' should be one of bool, int16"),
     ('N7:0', {'kind': 7}, 'kind 7 should be one of'), (None, {}, 'address None should be a text'),
@@ -322,10 +327,13 @@ def test_entries_of_the_log_that_nothing_takes_are_counted(
     *((address, {'values': values}, text) for address, values, text in (
         ('N7:0', 70000, 'value 70000 at index 0 is not a valid int16'),
         ('T4:0.CON', 1, 'T4:0 belongs to the processor'), ('ST9:0', 5, 'not a valid string'),
-        ('N7:0', None, 'None should be a number, several, or a text'),
-        ('N7:0', [[1]], 'should be a'), ('N7:0', [], r'\[\] should be a number, several'),
-        ('N7:0', {1: 2}, 'should be a'),
-        ('N7:0', b'1', 'should be a'), ('N7:0', [1, '1'], 'should be')))])
+        ('N7:0', None, r'None should be a number \(int, float, bool\), a list of numbers, or a '
+         r'text \(str\)$'),
+        ('N7:0', [[1]], 'should be a'), ('N7:0', [], r'\[\] should be a number'),
+        ('N7:0', {1: 2}, 'should be a'), ('ST9:0', bytearray(b'1'), 'should be a'),
+        ('N7:0', b'1', 'should be a'), ('N7:0', [1, '1'], 'should be'))),
+    ('N7:0', {'values': 1, 'kind': 2}, '^kind 2 should be a text; several values are one list$'),
+    (('N7:0', 5), {'values': 1}, r"^address \('N7:0', 5\) should be one text")])
 def test_what_is_wrong_in_a_call_is_told_before_anything_is_sent(
         port: str, address: Any, arguments: dict[str, Any], text: str) -> None:
     with client(port, plc_type='SLC') as plc:
@@ -353,7 +361,10 @@ def test_arguments_of_the_line(tmp_path: Path) -> None:
             ({'cmd_timeout': '1'}, "cmd_timeout '1' should be seconds above 0, up to 60$"),
             ({'timeout': 60001}, ' 60$'), ({'timeout': 0}, 'timeout 0 '),
             ({'timeout': math.nan}, 'timeout nan'),
-            ({'processor': '5/02'}, 'processor needs plc_type')):
+            ({'processor': '5/02'}, 'processor needs plc_type'),
+            ({'logger': 'mine'}, "^logger 'mine' should be a logging.Logger, as from "
+             r"logging.getLogger\('mine'\)$"),
+            ({'logger': None}, r'^logger None should be .*getLogger\(\)$')):
         with pytest.raises(FormatError, match=text):
             Client(port, **wrong)  # type: ignore[arg-type]
     for name, right in ((None, 'text'), (5, 'text'), ('', 'text'), *(
@@ -361,7 +372,8 @@ def test_arguments_of_the_line(tmp_path: Path) -> None:
             (name, f'device path, socket://host:port or rfc2217://host:port; {cure}$')
             for name, cure in (('192.168.1.5:4001', 'write socket://192.168.1.5:4001'),
                                ('COM3', '"plc ports" lists the devices'),
-                               ('ttyUSB0', '"plc ports" lists the devices')))):
+                               ('ttyUSB0', '"plc ports" lists the devices'),
+                               ('socket://10.0.0.1:4001/', 'write socket://10.0.0.1:4001')))):
         with pytest.raises(FormatError, match=f'port {name!r} should be a {right}'):
             Client(name)  # type: ignore[arg-type]
     with pytest.raises(OSError, match='none'):
@@ -376,6 +388,7 @@ def test_arguments_of_the_line_and_gateways_reach_it(
     more: dict[str, Any] = {'trace': '/x/line.cap', 'logger': logging.Logger('other')}
     Client('/dev/x', baud=19200, parity='even', check='bcc', station=254, own_station=254,
            retries=10, timeout=0.25, cmd_timeout=0.75, duplex='HALF', **more)
+    Client('/dev/x', parity=None)
     rows = 'Tag,Command,Address,Station,Via,PLC_Type\nfar,Read,N7:0,9,3,SLC\n' \
         'last,Read,N7:0,254,,SLC\nall,Write,N7:0,255,,SLC\n'
     assert [*Client.from_files(*files(tmp_path, '/dev/x', rows), **more).rows] == ['far', 'last']
@@ -383,7 +396,8 @@ def test_arguments_of_the_line_and_gateways_reach_it(
     assert given[0] == (MASTER, LinkSettings(
         station=254, checksum=Checksum.BCC, timing=LineTiming(port.char_time), nak_retries=10,
         enq_retries=10, timeout=0.25, cmd_timeout=0.75), port, more)
-    *_, stations, plc_type, named = given[1]
+    assert given[1][2].parity == PortSettings('/dev/x').parity
+    *_, stations, plc_type, named = given[2]
     assert (stations.via(9), stations.via(8), str(plc_type), named) == (3, 8, 'SLC', more)
 
 
@@ -405,6 +419,68 @@ def test_forgotten_close_is_told_and_closed_client_refuses(
         assert plc.read('N7:0') == 0
     with closing(open_port(PortSettings(port))), pytest.raises(OSError, match='another program'):
         client(port)
+
+
+def test_what_identify_returns_may_be_given(port: str) -> None:
+    with client(port) as plc:
+        found = plc.identify()
+    for arguments in ({'plc_type': found.plc_type, 'processor': found.processor},
+                      {'plc_type': 'SLC 500', 'processor': 'SLC 5/03'}):
+        with Client(port, duplex='half', **arguments) as plc:  # type: ignore[arg-type]
+            assert plc.read('N7:0') == 0
+
+
+def test_client_shows_its_port_and_takes_no_setting_later(port: str) -> None:
+    with client(port, plc_type='SLC') as plc:
+        plc.read('N7:0')
+        assert repr(plc) == f'<Client of {port}: open>'
+        with pytest.raises(AttributeError, match='timeout'):
+            plc.timeout = 5  # type: ignore[attr-defined]
+    assert repr(plc) == f'<Client of {port}: closed>'
+
+
+def test_forgotten_close_is_a_warning_where_python_shows_it(port: str) -> None:
+    program = ('import sys; from abdf1_ros import Client\n'
+               'def forgets(): Client(sys.argv[1])\n'
+               'def closes():\n with Client(sys.argv[1]): pass\n'
+               'closes(); forgets()')
+    said = subprocess.run([sys.executable, '-X', 'dev', '-c', program, port], text=True,
+                          capture_output=True, timeout=PATIENCE, check=True)
+    assert re.findall(r'^(\S+: ResourceWarning: unclosed <Client of \S+): ', said.stderr, re.M) \
+        == [f'<string>:2: ResourceWarning: unclosed <Client of {port}']
+
+
+def test_client_stays_in_its_process(port: str) -> None:
+    with client(port, plc_type='SLC') as plc:
+        for copied in pickle.dumps, copy.copy:
+            with pytest.raises(TypeError, match='^a Client cannot be pickled or copied, because'):
+                copied(plc)
+        reader, writer = multiprocessing.get_context('fork').Pipe(duplex=False)
+        child = os.fork()
+        if not child:
+            try:
+                plc.read('N7:0')
+            except PortLost as error:
+                writer.send((str(error), error.sent))
+            finally:
+                os._exit(0)
+        assert reader.poll(PATIENCE)
+        assert reader.recv() == ('N7:0 of station 1: port lost: another process has opened it; '
+                                 'each process needs a client of its own', False)
+        assert os.waitpid(child, 0)[1] == 0
+        assert plc.read('N7:0') == 0
+
+
+def test_call_in_the_last_moments_of_a_program_says_so(port: str) -> None:
+    program = ('import sys; from abdf1_ros import Client\n'
+               'class Last:\n'
+               ' def __del__(self):\n'
+               '  try: plc.read("N7:0")\n'
+               '  except Exception as error: print(error)\n'
+               'plc = Client(sys.argv[1], duplex="half", plc_type="SLC"); last = Last()')
+    said = subprocess.run([sys.executable, '-c', program, port], text=True, capture_output=True,
+                          timeout=PATIENCE, check=True)
+    assert said.stdout == 'N7:0 of station 1: port lost: this program ends\n'
 
 
 def test_close_in_another_thread_is_waited_for(

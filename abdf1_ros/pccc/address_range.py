@@ -134,6 +134,7 @@ def read_range(text: str, parse: Callable[[str], Address]) -> Address | AddressR
     is_short = end.isdigit()
     if is_short:
         if not _NUMBER.search(start):
+            parse(start)  # raises an error if nothing stands before the "-" of a number below 0
             raise AddressSyntaxError(f'{start} does not end with a number, so write the whole '
                                      'last address, too')
         end = _NUMBER.sub(end, start)

@@ -362,6 +362,8 @@ def port_advice(text: str) -> str:
         return f'write socket://{shown(match["host"])}{match["port"]}'
     if match and match['scheme']:
         return f'the port is missing, as in {shown(text)}:4001'
+    if is_url(text.rstrip('/')):
+        return f'write {shown(text.rstrip("/"))}'
     return f'"plc ports" lists the devices{hint(text)}'
 
 
