@@ -37,7 +37,7 @@ about heartbeats runs in each PLC where the plant has a ``scan``.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
 import hashlib
@@ -62,6 +62,7 @@ from abdf1_ros.pccc.address import Address, Area
 from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.pccc.families import dialect_of, parse_address
 from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.values import ValueType
 from abdf1_ros.plan.report import make_report
 from abdf1_ros.settings.heartbeats import Fallback, LONGEST_END, TIME_BASE, While
 from abdf1_ros.settings.mapping import Mapping
@@ -70,23 +71,24 @@ from abdf1_ros.simulator.ladder import Ladder, Lamp
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 from support.devices import Device, Filter, link_of, symbol_by_symbol
 from support.driver_bench import DriverBench, Kept
+from support.forms import Forms, MASKED_SLC, Meant, SAFE, value_of_bit
 from support.losses import AirLosses, Losses, Lost
 from support.mappings import make_mapping
 from support.multidrop import MasterNode
 from support.virtual_line import Noise, QUIET, VirtualLine
 
 STEP = 0.05  # s
-SAFE = 32_000  # the fallback of every row
 GUESTS = range(33_000, 33_600)  # what only guests write: more than a heartbeat counts to
 OTHERS = 34_000  # what comes into a word from another network
 LARGEST = 31_000  # of what is published
 _LEAST_COMMAND = 10  # bytes: no poll
+_HEADER = 6  # bytes before the data of a command
 _FIFO = 16  # bytes that come together; a longer reply shows before Timeout that it comes
 _PRESSED_EVERY = 1.0  # s
 _MASTER_RESTS = 0.005  # s, of one that polls us, before all that it sends
 SLAVE_PRESET = 1000  # of a watchdog where none is printed, in units of 10 ms
 _ALL = 255  # stations
-_WRITES = (b'\x67', b'\xAA')  # functions of a typed write
+_WRITES = (b'\x67', b'\xAA', b'\x26', MASKED_SLC)  # functions of a typed write, and of bits
 _REPLY = 0x40  # in the command of a reply
 _MASKED = 0x0F  # command of a write that names single words
 _TICKS = 30_000
@@ -219,7 +221,7 @@ class Sent(NamedTuple):
 @dataclass(frozen=True, slots=True)
 class Executed:
     """
-    A word that a PLC has taken from the line.
+    What a PLC has taken from the line into a row: a bit, or words from ``at`` of it on.
 
     ``driver`` is the number of the driver that has sent it. ``before`` was in the word.
     ``is_late`` tells that a gateway had kept it, ``is_told`` that the PLC has replied.
@@ -233,6 +235,7 @@ class Executed:
     before: int
     is_late: bool = False
     is_told: bool = True
+    at: int = 0
 
 
 class Shown(NamedTuple):
@@ -250,6 +253,16 @@ class Shown(NamedTuple):
             if self.area == area and 0 <= at < len(self.words) else None
 
 
+class Message(NamedTuple):
+    """A message on its way: when it was published, what its stamp says, and its number."""
+
+    row: Mapping
+    value: int
+    published: float
+    stamp: float
+    number: int
+
+
 class Said(NamedTuple):
     """What the master has written to our table; ``sts`` is None where it got no reply."""
 
@@ -263,7 +276,7 @@ class WatchedPlc:
     """A PLC, and what it does with what comes."""
 
     plc: SimulatedPlc
-    places: dict[str, str]  # address by tag
+    rows: dict[str, Mapping]  # that we write, by tag
     refuses: bool = False  # everything but heartbeats
     refuses_messages: bool = False  # but takes fallbacks
     swallows_replies: bool = False  # to messages, which are executed, and to some heartbeats
@@ -276,18 +289,58 @@ class WatchedPlc:
     # What the lamps of its ladder showed, with the time, and which of them are on.
     lamps: list[tuple[float, Lamp, bool]] = field(default_factory=list)
     shown: deque[Shown] = field(default_factory=lambda: deque(maxlen=1000))
-    tags: dict[str, str] = field(init=False)  # by address
+    gone: dict[str, Mapping] = field(default_factory=dict)  # rows of files before
     place_of: Callable[[str], Address] = field(init=False)
 
     def __post_init__(self) -> None:
-        self.tags = {place: tag for tag, place in self.places.items()}
         self.place_of = cache(partial(parse_address, plc_type=self.plc.table.plc_type))
 
-    def take_places(self, places: dict[str, str]) -> None:
-        """Take the places of other rows; a place that is left is known as gone."""
-        left = {place: f'gone_{tag.removeprefix("gone_")}' for place, tag in self.tags.items()}
-        self.places = places
-        self.tags = left | {place: tag for tag, place in places.items()}
+    @property
+    def places(self) -> dict[str, str]:
+        """Return the address of each row."""
+        return {tag: str(row.address) for tag, row in self.rows.items()}
+
+    def take_rows(self, rows: dict[str, Mapping]) -> None:
+        """Take other rows; one that is left is known as gone while no other row has its words."""
+        left = self.gone | {f'gone_{tag}': row for tag, row in self.rows.items()}
+        self.rows = rows
+        self.gone = {tag: row for tag, row in left.items()
+                     if not any(row.extent.meets(other.extent) for other in rows.values())}
+
+    def lacks(self, command: Packet) -> bool:
+        """Tell whether it refuses a masked write, as processors do that may lack it."""
+        return command.data[:1] == MASKED_SLC and any(
+            row.may_rewrite for row in self.rows.values())
+
+    def held(self, row: Mapping) -> int:
+        """Return what it holds in a row; of words that differ the first that is not safe."""
+        words = self.plc.table.read(row.address, row.codec.words)
+        if row.address.bit is not None:
+            return value_of_bit(row, int.from_bytes(words, 'little') >> row.address.bit & 1)
+        values = [int.from_bytes(words[at:at + 2], 'little') for at in range(0, len(words), 2)]
+        return next((value for value in values if value != SAFE), SAFE)
+
+    def changes(self, address: Address, data: bytes,
+                meant: Meant | None) -> Iterator[tuple[str, int, int, int]]:
+        """
+        Yield tag, value, value before and first word of each row that words would change.
+
+        Of bits these are the row that is ``meant``, and those that become another one.
+        """
+        for tag, row in (self.rows | self.gone).items():
+            at = max(0, address.offset - row.extent.first)
+            skipped = row.extent.first + at - address.offset
+            if address.area != row.extent.area or 2 * skipped >= len(data) \
+                    or row.extent.first + at >= row.extent.end:
+                continue
+            found = self.plc.table.read(row.address.at_offset(row.extent.first + at), 1)
+            word, before = (int.from_bytes(each, 'little')
+                            for each in (data[2 * skipped:][:2], found))
+            if (bit := row.address.bit) is None:
+                yield tag, word, before, at
+            elif (word ^ before) >> bit & 1 or meant is not None and meant.tag == tag:
+                yield (tag, value_of_bit(row, word >> bit & 1),
+                       value_of_bit(row, before >> bit & 1), at)
 
     def word(self, text: str) -> int:
         return int.from_bytes(self.plc.table.read(self.place_of(text), 1), 'little')
@@ -470,7 +523,8 @@ class World(DriverBench):
         # Words that PLCs have taken; and all that they have executed, as station and command.
         self.executed, self.commands = list[Executed](), list[tuple[float, int, Packet]]()
         self.published: dict[tuple[str, int], float] = {}
-        self.keys: list[tuple[str, int]] = []  # of all messages, in their order
+        self.keys: list[tuple[str, int]] = []  # of all messages; their results have the number
+        self.counts_from: dict[int, float] = {}  # from when the age of each that came counts
         self._guests = [Guest(f'pty:{number}', ShareAccess.ALL)
                         for number in range(self.dice.choice([1, 2, 16]))]
         self.asked: list[Packet] = []  # by the guest
@@ -528,9 +582,9 @@ class World(DriverBench):
         return self.listener.reads
 
     def _watch(self, station: int) -> WatchedPlc:
-        plc = self.plc(station, self.plant.kind, ('N7:0', max(24, self.plant.held)), ('N9:0', 8),
+        plc = self.plc(station, self.plant.kind, ('N7:0', max(80, self.plant.held)), ('N9:0', 8),
                        ('N10:0', 1))
-        watched = WatchedPlc(plc, self._places(station))
+        watched = WatchedPlc(plc, self._written(station))
         if self.plant.scan:
             self._run_ladder(watched)
         serve = plc.serve
@@ -546,9 +600,9 @@ class World(DriverBench):
             station=self.plant.gateway or station, checksum=self.network.checksum), come)
         return watched
 
-    def _places(self, station: int) -> dict[str, str]:
-        return {row.tag: str(row.address) for row in self.rows.values()
-                if row.station == station and (row.writes or row.is_heartbeat)}
+    def _written(self, station: int) -> dict[str, Mapping]:
+        return {row.tag: row for row in self.rows.values()
+                if row.station == station and row.changes}
 
     def _run_ladder(self, watched: WatchedPlc) -> None:
         """Let its ladder run, and somebody who presses its button all the time."""
@@ -645,32 +699,35 @@ class World(DriverBench):
         if not is_write(command):
             return self._read_out(watched, command, serve)
         station = watched.plc.station
-        written: list[tuple[str, int, int]] = []
+        if watched.lacks(command):
+            self.forms.meant(station, command.data)
+            return command.reply(sts=0x10)
+        meant = None if is_late else self.forms.meant(station, command.data)
+        written: list[tuple[str, int, int, int]] = []
         table = watched.plc.table
-        write, by_address = table.write, watched.tags
+        write = table.write
 
         def note(address: Address, data: bytes) -> None:
-            place = str(address)
-            if place in by_address:
-                written.append((by_address[place], int.from_bytes(data, 'little'),
-                                watched.word(place)))
+            written.extend(watched.changes(address, data, meant))
             write(address, data)
 
         table.write = note  # type: ignore[method-assign]
+        saved = {area: bytes(words) for area, words in table.words.items()} \
+            if watched.refuses or watched.refuses_messages else {}
         reply = serve(command)
         del table.write
-        values = {value for tag, value, _ in written if not tag.startswith('beat')}
+        values = {value for tag, value, *_ in written if not tag.startswith('beat')}
         is_message = any(value != SAFE and value not in GUESTS for value in values)
         if values and (watched.refuses or watched.refuses_messages and is_message):
-            for tag, _, before in written:
-                watched.set(watched.places[tag], before)
+            for area, words in saved.items():
+                table.words[area][:] = words
             return command.reply(sts=0x10)
         is_told = not watched.swallows_replies or not is_message and (
             bool(values) or self.dice.random() < 0.5)
         self.executed += [
             Executed(now, station, tag, value, self._senders.get((tag, value), self.drivers),
-                     before, is_late, is_told)
-            for tag, value, before in written]
+                     before, is_late, is_told, at)
+            for tag, value, before, at in written]
         if not is_told:
             return reply._replace(tns=reply.tns ^ 0x8000)  # which nobody waits for
         return reply
@@ -721,15 +778,12 @@ class World(DriverBench):
         station, tail = data[begun], data[begun:]
         if tail[1] != OURS:
             return  # a message that we pass on for a slave
-        for name, begin in self._begins.items():
-            at = tail.find(begin)
-            if at >= 0:
-                word = tail[at + len(begin):][:4].replace(stuff(DLE), DLE)[:2]
-                is_again = tail == self._last_sent.get(station)
-                self._last_sent[station] = tail
-                key = f'{name}_{station}', int.from_bytes(word, 'little')
-                self._senders[key] = self.drivers
-                self.sent.append(Sent(start, station, *key, is_again))
+        meant = self.forms.meant(station, tail.replace(stuff(DLE), DLE)[_HEADER:])
+        if meant is not None:
+            is_again = tail == self._last_sent.get(station)
+            self._last_sent[station] = tail
+            self._senders[meant.tag, meant.value] = self.drivers
+            self.sent.append(Sent(start, station, meant.tag, meant.value, is_again))
 
     def _hear(self, data: bytes) -> bytes:
         self.wire.update(b'%f>' % self.line.now + data)
@@ -754,45 +808,54 @@ class World(DriverBench):
 
     # What people and programs do
 
-    def publish(self, row: Mapping, late: float = 0.0) -> None:
+    def publish(self, row: Mapping, late: float = 0.0, *, is_equal: bool = False) -> None:
         """
-        Publish a value that nobody has published before, ``late`` s ago.
+        Publish a value that nobody has published before, or an equal one, ``late`` s ago.
 
-        It waits for a process that stands still. Its stamp is of the clock of the publisher.
+        It waits for a process that stands still. Its stamp is of the clock of the publisher. A
+        row of one bit has no other value.
         """
-        value = self._values[row.tag] = self._values[row.tag] % LARGEST + 1
+        is_new = not is_equal and row.type is not ValueType.BOOL
+        value = self._values.get(row.tag, 0) or 1
+        if is_new:
+            value = self._values.get(row.tag, 0) % LARGEST + 1
+        self._values[row.tag] = value
         now, published = self.line.now, self.line.now - late
-        self.published[row.tag, value] = published
+        self.published[row.tag, value] = max(
+            published, self.published.get((row.tag, value), -math.inf))
         self.came[row.tag] = now
         if now < self._dead_until:  # nothing is kept for it
             return
         self.keys.append((row.tag, value))
-        stamp = self.clocks.stamp(published)
+        message = Message(row, value, published, self.clocks.stamp(published), len(self.keys) - 1)
         if now < self.away:
-            self.at(self.away, partial(self._take, self.drivers, row, value, stamp))
+            self.at(self.away, partial(self._take, self.drivers, message))
         else:
-            self._take(self.drivers, row, value, stamp)
+            self._take(self.drivers, message)
 
-    def _take(self, driver: int, row: Mapping, value: int, stamp: float) -> None:
+    def _take(self, driver: int, message: Message) -> None:
         """Take a message as the node does, unless the driver has ended that it was for."""
         if driver != self.drivers:
             return
-        now = self.line.now
+        row, value, published, stamp, number = message
+        now, values = self.line.now, row.length * [value]
         try:
             age = self.clocks.age(row.tag, stamp, now)
         except FormatError as error:
-            self.driver.refuse([row], str(error), [value], '')
+            self.driver.refuse([row], str(error), values, str(number))
             return
-        key = row.tag, value
-        if not self.clocks.is_unknowable(row.tag, self.published[key], stamp, age, now):
-            self.clocks.counted.append((row.tag, self.published[key], now - age))
-        self.published[key] = now - age
+        if not self.clocks.is_unknowable(row.tag, published, stamp, age, now):
+            self.clocks.counted.append((row.tag, published, now - age))
+        self.counts_from[number] = now - age
+        is_last = self.published[row.tag, value] == published
+        self.published[row.tag, value] = now - age if is_last else max(
+            now - age, self.published[row.tag, value])
         missing = self.youngest.get(row.tag, 0.0) + (self.plant.requires or 0) / 1000
         if not any(now - age <= until for _, until in self.crowds.get(row.tag, ())):
             if now - age > missing:
                 self.gaps[row.tag] = missing
             self.youngest[row.tag] = max(now - age, self.youngest.get(row.tag, -math.inf))
-        self.driver.write([row], [value], now - age)
+        self.driver.write([row], values, now - age, str(number))
         self.line.wake(self.driver.machine)
 
     def crowd(self, row: Mapping, *, is_told: bool = True) -> None:
@@ -1040,7 +1103,7 @@ class World(DriverBench):
         self._take_rows(rows)
         self.mappings = rows
         for watched in self.plcs.values():
-            watched.take_places(self._places(watched.plc.station))
+            watched.take_rows(self._written(watched.plc.station))
         self._begin_anew()
 
     def _take_rows(self, rows: Sequence[Mapping]) -> None:
@@ -1050,9 +1113,7 @@ class World(DriverBench):
                                   max(0.01, self.plant.scan / 1000))
         self.bounds = {bound.mapping.tag: bound.seconds for bound in self.report.times.bounds()}
         self.longest = self.report.times.longest  # s
-        self._begins = {  # how each write begins on the line, by tag without the station
-            row.tag[:-2]: stuff(row.dialect.write(row.address, b'\0\0')[1][:-2])
-            for row in rows if row.station == 1 and row.tag.startswith(('w', 'free', 'beat'))}
+        self.forms = Forms(row for row in rows if row.changes and not row.serves)
 
     def rows_of(self, station: int, tags: Sequence[str] = ('w',)) -> list[Mapping]:
         """Return rows of a PLC whose tags begin so; of outputs those with Fallback."""
@@ -1080,7 +1141,7 @@ class OtherBridge(DriverBench):
         self.line.now = world.line.now
         plc = SimulatedPlc(station, first.plc.table, self.network.checksum, self.clock,
                            processor=first.plc.processor)
-        watched = WatchedPlc(plc, {row.tag: BEAT})
+        watched = WatchedPlc(plc, {row.tag: row})
         serve = plc.serve
 
         def execute(command: Packet) -> Packet:

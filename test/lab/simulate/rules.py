@@ -34,6 +34,7 @@ from abdf1_ros.df1.probes import OTHERS_SHARE
 from abdf1_ros.df1.radio import LONGEST_WAIT
 from abdf1_ros.driver.write import Outcome, WriteResult
 from abdf1_ros.plan.bounds import MODE_PERIOD
+from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.simulator.ladder import Lamp
 from support.world import Executed, GUESTS, OTHERS, SAFE, Said, Sent, STEP, WatchedPlc, World
 
@@ -103,9 +104,14 @@ class Results(Rule):
 
     def __init__(self, world: World) -> None:
         super().__init__(world)
-        self._waits: dict[tuple[str, int], float] = {}
-        self._outcomes: dict[tuple[str, int], Outcome] = {}
-        self._by: set[tuple[str, int]] = set()
+        # Messages by their number, and the last look before they came.
+        self._waits: dict[int, float] = {}
+        self._ended: set[int] = set()
+        # By tag and value: messages so far, those that were never to be sent, and when a PLC
+        # executed a packet, by the first of its words in the row.
+        self._asked: Counter[tuple[str, int]] = Counter()
+        self._never: Counter[tuple[str, int]] = Counter()
+        self._times: defaultdict[tuple[str, int], dict[int, list[float]]] = defaultdict(dict)
         self._safe: defaultdict[str, float] = defaultdict(lambda: -math.inf)
         self._seen = self._process = 0
         self._looked = 0.0
@@ -118,44 +124,90 @@ class Results(Rule):
             self._safe[entry.tag] = entry.when
         if entry.tag[0] not in 'wf' or entry.value == SAFE or entry.value in GUESTS:
             return
+        row = self.world.rows.get(entry.tag)
+        if entry.is_late and row is not None and row.may_rewrite:
+            return  # a late write of another bit brings this one back
         self.demand(key in self.world.published, key, 'was never published')
-        self.demand(key not in self._by, key, 'was executed twice')
-        self.demand(self._outcomes.get(key) not in _NEVER_EXECUTED, key, 'was not to be sent')
-        self._by.add(key)
+        self._times[key].setdefault(entry.at, []).append(entry.when)
+        self._demand_few(key, 'was executed too often')
+
+    def _demand_few(self, key: tuple[str, int], text: str) -> None:
+        """Demand that no packet was executed more often than there are messages for it."""
+        self._asked.update(self.world.keys[self._asked.total():])
+        most = max(map(len, self._times[key].values()), default=0)
+        self.demand(most <= self._asked[key] - self._never[key], key, text, self._times[key])
 
     def told(self, result: WriteResult) -> None:
+        row = result.mapping
         if result.outcome is Outcome.FALLBACK:
-            if result.mapping.serves:
-                return
-            came = self._safe[result.mapping.tag]
-            self.demand(came > self._looked - self.flight - self.held, result.mapping.tag,
+            came = self._safe[row.tag]
+            self.demand(row.serves or came > self._looked - self.flight - self.held, row.tag,
                         'got its fallback', came)
             return
-        key = result.mapping.tag, int(result.value.strip('[]'))
-        if result.mapping.serves and result.outcome is Outcome.WRITTEN:
-            self._by.add(key)
-        self.demand(key not in self._outcomes, key, 'has two results')
-        self._outcomes[key] = result.outcome
-        self._waits.pop(key, None)
-        if result.outcome is Outcome.WRITTEN:
-            self.demand(key in self._by, key, 'is told as written')
+        self.demand(bool(result.request), result, 'is of no message')
+        number = int(result.request)
+        key = self.world.keys[number]
+        self.demand(number not in self._ended, key, 'has two results')
+        self._ended.add(number)
+        since = self._waits.pop(number, self._looked if number >= self._seen else -math.inf)
+        if result.outcome is Outcome.WRITTEN and not row.serves:
+            ends = [times[-1] for times in self._times[key].values()]
+            self.demand(len(ends) >= self.world.forms.packets(row) and min(ends) >= since, key,
+                        'is told as written', since, ends)
         elif result.outcome in _NEVER_EXECUTED:
-            self.demand(key not in self._by, key, f'was executed, and told as {result.outcome}')
+            self._never[key] += 1
+            self._demand_few(key, f'was executed, and told as {result.outcome}')
 
     def over(self) -> None:
-        self.demand(not self._waits, [*self._waits], 'have no result')
+        self.demand(not self._waits, [*map(self.world.keys.__getitem__, self._waits)],
+                    'have no result')
 
     def stand(self) -> None:
-        now = self._looked = self.world.line.now
-        new = self.world.keys[self._seen:]
-        self._seen += len(new)
+        before, now = self._looked, self.world.line.now
+        self._looked = now
+        new = range(self._seen, len(self.world.keys))
+        self._seen = len(self.world.keys)
         if self._process != self.world.process:  # what the killed one knew is gone
             self._process = self.world.process
             self._waits.clear()
             return
-        self._waits.update((key, now) for key in new if key not in self._outcomes)
-        oldest = next(iter(self._waits.values()), math.inf)
-        self.demand(now - oldest < self._limit, next(iter(self._waits), None), 'has no result')
+        self._waits.update((number, before) for number in new if number not in self._ended)
+        number, came = next(iter(self._waits.items()), (0, math.inf))
+        self.demand(now - came < self._limit, self.world.keys[number:number + 1], 'has no result')
+
+
+class Stands(Rule):
+    text = 'what is not written again is in the PLC, as was read lately (27)'
+
+    def __init__(self, world: World) -> None:
+        super().__init__(world)
+        self._last: dict[str, Executed] = {}  # of our own line
+        self._held: dict[str, tuple[int, float]] = {}  # and when it was seen last
+
+    def executed(self, entry: Executed) -> None:
+        self._last[entry.tag] = entry
+        self._held[entry.tag] = entry.value, entry.when
+
+    def stand(self) -> None:
+        for tag, row in self.world.rows.items():
+            if row.write_again is not None:
+                value = self.world.plcs[row.station].held(row)
+                if value == self._held.get(tag, (None, 0.0))[0]:
+                    self._held[tag] = value, self.world.line.now
+
+    def told(self, result: WriteResult) -> None:
+        row = result.mapping
+        if result.outcome is not Outcome.STANDS:
+            return
+        assert row.write_again is not None
+        now, again = self.world.line.now, row.write_again / 1000
+        _, value = self.world.keys[int(result.request)]
+        last, (held, seen) = self._last.get(row.tag), self._held.get(row.tag, (None, 0.0))
+        self.demand(last is not None and last.value == held == value, result, last)
+        assert last is not None
+        patience = row.fallback.after / 1000 if row.fallback else self.world.plant.write_timeout
+        self.demand(now - last.when < again + self.flight, result, 'confirmed at', last.when)
+        self.demand(now - seen < min(again, patience) + 2 * STEP, result, 'held until', seen)
 
 
 class Ages(Rule):
@@ -181,8 +233,10 @@ class Ages(Rule):
         published = world.published[tag, entry.value]
         limit = world.plant.write_timeout
         row = world.rows.get(tag)
-        if row is not None and row.fallback:
-            limit = min(limit, world.plant.after / 1000)
+        if row is None or not row.fallback:  # new files have none, and are a new start (5)
+            self.demand(entry.when - published < limit + _MOMENT, entry, published)
+            return
+        limit = min(limit, world.plant.after / 1000)
         self.demand(entry.when - published < limit + _MOMENT, entry, published)
         fallback = self._fallbacks[tag]
         self.demand(published > fallback - self.lag, entry, published,
@@ -280,19 +334,21 @@ class ReadBack(Rule):
 
     def __init__(self, world: World) -> None:
         super().__init__(world)
-        self._sent: dict[tuple[str, int], float] = {}
+        self._sent: defaultdict[tuple[str, int], list[float]] = defaultdict(list)
 
     def sent(self, entry: Sent) -> None:
-        self._sent[entry.tag, entry.value] = entry.when
+        self._sent[entry.tag, entry.value].append(entry.when)
 
     def told(self, result: WriteResult) -> None:
         if _READ_BACK not in result.detail:
             return
-        row, value = result.mapping, int(result.value.strip('[]'))
-        when = self.world.published[row.tag, value] + result.latency
+        row, number = result.mapping, int(result.request)
+        _, value = self.world.keys[number]
+        published = self.world.counts_from[number]
+        when = published + result.latency
+        sent = [each for each in self._sent[row.tag, value] if published <= each <= when]
         found = self.world.plcs[row.station].answered(row.address, row.address.offset, when)
-        self.demand(found is not None and found[0] >= self._sent[row.tag, value], result,
-                    'not read since', self._sent[row.tag, value])
+        self.demand(found is not None and found[0] >= max(sent), result, 'not read since', sent)
         is_held = result.detail.endswith(f'{_READ_BACK} the value')
         self.demand(found is not None and is_held == (found[1] == value), result,
                     'but it answered', found)
@@ -496,7 +552,7 @@ class BeatsAfterFallbacks(Rule):
     def sent(self, entry: Sent) -> None:
         world = self.world
         if not entry.tag.startswith('beat') or entry.value in (0, *GUESTS) \
-                or entry.when < world.killed_at:  # of the process before
+                or entry.when <= world.killed_at:  # of the process before
             return
         for tag in [row.tag for row in world.rows_of(entry.station)]:
             holds, youngest = self._holds.get(tag), world.youngest.get(tag, -math.inf)
@@ -548,7 +604,7 @@ class Outputs(Rule):
     def told(self, result: WriteResult) -> None:
         tag = result.mapping.tag
         if result.outcome is Outcome.WRITTEN:
-            when = self.world.published[tag, int(result.value.strip('[]'))]
+            when = self.world.counts_from[int(result.request)]
             self._stood[tag] = max(self._stood[tag], when)
 
     def executed(self, entry: Executed) -> None:
@@ -567,13 +623,13 @@ class Outputs(Rule):
         now = world.line.now
         if world.plant.is_read_only:
             return
-        for station, watched, tag, bound in self._rows():
-            limit = bound + STEP
+        for station, watched, row, bound in self._rows():
+            limit, tag = bound + STEP, row.tag
             calm = max(world.ill[station], world.ill[0])
             brought = watched.brought  # by a download, and seen when it runs or is written again
             if now < max(calm, brought + MODE_PERIOD + _REWRITTEN) + limit:
                 continue
-            value = watched.word(watched.places[tag])
+            value = watched.held(row)
             if value == OTHERS:  # it is seen by nobody, until the fallback is written again (8)
                 after = world.plant.after / 1000
                 limit += max(after, _REWRITTEN) + after
@@ -581,12 +637,12 @@ class Outputs(Rule):
             self.demand(value in (SAFE, 0) or now - self._stood[tag] < limit,
                         tag, value, 'since', self._stood[tag])
 
-    def _rows(self) -> Iterator[tuple[int, WatchedPlc, str, float]]:
+    def _rows(self) -> Iterator[tuple[int, WatchedPlc, Mapping, float]]:
         world = self.world
         for station, watched in world.plcs.items():
             for row in world.rows_of(station):
                 if (bound := world.bounds[row.tag]) is not None:
-                    yield station, watched, row.tag, bound
+                    yield station, watched, row, bound
 
 
 class OneResult(Rule):
@@ -644,7 +700,7 @@ class Crowds(Rule):
             calm = max(begun, world.ill[station], world.ill[0], self._late[tag] + world.held_for,
                        max(watched.brought, world.overwritten.get(tag, 0.0)) + MODE_PERIOD
                        + _REWRITTEN)
-            value = watched.word(watched.places[tag])
+            value = watched.held(world.rows[tag])
             self.demand(value == SAFE or world.line.now < calm + limit, tag, value, 'since',
                         begun)
 
@@ -757,7 +813,7 @@ class Held(Rule):
             since = max(world.ill[station], world.ill[0], world.came.get(f'w0_{station}', 0.0))
             is_ours = not watched.other and station not in world.others
             if world.line.now > since + limit + MODE_PERIOD and is_ours:
-                self.demand(watched.word(watched.places[beat]) == 0, beat, 'counts since', since)
+                self.demand(watched.held(world.rows[beat]) == 0, beat, 'counts since', since)
 
 
 class Rungs(Rule):
@@ -1019,8 +1075,8 @@ class OneOwner(Rule):
 
 
 RULES: tuple[type[Rule], ...] = (
-    Results, Ages, Stamps, Turns, Values, Guards, Withheld, Beats, BeatsAfterFallbacks, Order,
-    Outputs, OneResult, Crowds, Probes, Unheard, Queued, AfterRun, Held, ReadOnly, Guests,
+    Results, Stands, Ages, Stamps, Turns, Values, Guards, Withheld, Beats, BeatsAfterFallbacks,
+    Order, Outputs, OneResult, Crowds, Probes, Unheard, Queued, AfterRun, Held, ReadOnly, Guests,
     GuestAges, OnTheWire, View, Fresh, Served, Rungs, Answers, ReadBack, Repeats, Taken, Foreign)
 
 

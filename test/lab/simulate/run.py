@@ -238,7 +238,7 @@ class Story:
     def _demand_safe_words(self, named: Iterable[str] = ()) -> None:
         world, left_out = self.world, {*named}
         for station, watched in world.plcs.items():
-            words = {row.tag: watched.word(watched.places[row.tag])
+            words = {row.tag: watched.held(row)
                      for row in world.rows_of(station, ('w', 'beat')) if row.tag not in left_out}
             is_zero = not words.get(f'beat_{station}') or station in self.judge.owner.since
             if {value for tag, value in words.items() if tag[0] == 'w'} - {SAFE} or not is_zero:

@@ -14,14 +14,16 @@
 
 """A few new plants in each run, and that a seed replays one."""
 
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from dataclasses import replace
 import secrets
+from typing import Any
 from unittest import mock
 
 from abdf1_ros.df1.frames import ACK, ENQ
-from abdf1_ros.driver.write import Outcome
+from abdf1_ros.driver.write import Outcome, WriteResult
 from abdf1_ros.settings.heartbeats import HAND_OVER, LONGEST_END
+from abdf1_ros.settings.mapping import Command
 import pytest
 from simulate.mistakes import Mistake, MISTAKES
 from simulate.rules import (
@@ -34,6 +36,8 @@ from simulate.rules import (
     Order,
     ReadBack,
     Repeats,
+    Results,
+    Stands,
     Taken,
     View,
 )
@@ -47,6 +51,7 @@ from support.world import (
     Executed,
     GUESTS,
     MODES,
+    OTHERS,
     OUTPUTS,
     Plant,
     SAFE,
@@ -199,9 +204,68 @@ def test_finding_of_a_read_that_is_not_true_is_found() -> None:
     rule.told(result)
     with pytest.raises(Broken):
         rule.told(replace(result, detail='read back: the PLC holds another value'))
-    rule.sent(entry._replace(when=world.line.now))
+    rule.sent(entry._replace(when=world.published['w0_1', 1] + result.latency))
     with pytest.raises(Broken):
         rule.told(result)
+
+
+def _left_out() -> tuple[World, Executed, WriteResult]:
+    """Return a world in which an equal message was left out, the word, and the result."""
+    again: dict[str, Any] = {'command': Command.READ_WRITE, 'write_again': 900, 'period': 100}
+    world = World(Plant('Peer', rows=1, baud=38400, after=2000), 1, lambda rows: [
+        replace(row, **again) if row.tag == 'w0_1' else row for row in rows])
+    world.run(1.0)
+    world.publish(world.rows['w0_1'])
+    world.run(0.5)
+    world.publish(world.rows['w0_1'], is_equal=True)
+    world.run(STEP)
+    written, result = world.results[-2:]
+    assert (written.outcome, result.outcome) == (Outcome.WRITTEN, Outcome.STANDS)
+    return world, next(entry for entry in world.executed if entry.value == 1), result
+
+
+@pytest.mark.parametrize(('seconds', 'value', 'is_right'), [
+    (0.0, 1, True), (2.2, 1, False), (0.0, OTHERS, True), (0.9, OTHERS, True),
+    (1.1, OTHERS, False)])
+def test_value_that_is_left_out_too_long_after_it_stood_is_found(
+        seconds: float, value: int, is_right: bool) -> None:
+    world, entry, result = _left_out()
+    rule = Stands(world)
+    rule.executed(entry)
+    rule.stand()
+    world.plcs[1].set(OUTPUTS, value)
+    world.run(seconds)
+    if value == 1:
+        rule.stand()
+    with nullcontext() if is_right else pytest.raises(Broken):
+        rule.told(result)
+
+
+def test_value_that_is_left_out_after_a_guest_or_before_its_write_is_found() -> None:
+    world, entry, result = _left_out()
+    for last in ((), (entry, replace(entry, value=GUESTS[0]))):
+        rule = Stands(world)
+        for each in last:
+            rule.executed(each)
+        rule.stand()
+        with pytest.raises(Broken):
+            rule.told(result)
+
+
+def test_equal_message_that_is_executed_or_written_too_often_is_found() -> None:
+    world, entry, result = _left_out()
+    rule = Results(world)
+    rule.executed(entry)
+    rule.executed(entry)  # of two messages
+    with pytest.raises(Broken):
+        rule.executed(entry)
+    rule = Results(world)
+    rule.executed(entry)
+    rule.stand()
+    rule.told(replace(result, outcome=Outcome.WRITTEN))
+    rule = Results(world)
+    with pytest.raises(Broken):
+        rule.told(replace(result, outcome=Outcome.WRITTEN))
 
 
 def test_command_that_is_executed_twice_is_found() -> None:

@@ -18,29 +18,54 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from enum import Enum
 
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.settings.mapping import Mapping
-from support.world import Plant
+from abdf1_ros.pccc.processor import Processor
+from abdf1_ros.pccc.values import ValueType
+from abdf1_ros.settings.heartbeats import Fallback
+from abdf1_ros.settings.mapping import Command, Mapping
+from support.world import Plant, SAFE
 
 DIRECT = ('no reply', 'lost', 'refused')
 KEPT = ('kept last', 'kept 1', 'kept 2', 'sts last', 'sts 1', 'sts 2')
+Change = Callable[[list[Mapping]], list[Mapping]]
+
+_AFTER = 700  # ms
+_TWO_PACKETS = 42  # words for an SLC 5/01
+
 GATEWAY = (*DIRECT, 'not delivered', 'told undelivered', *KEPT)
 BEFORE = tuple(f'before {word} {when}'
                for word in ('speed', 'beat') for when in ('1', '2', 'last'))
 
 
-def _without(*tags: str) -> Callable[[list[Mapping]], list[Mapping]]:
+def _without(*tags: str) -> Change:
     return lambda rows: [row for row in rows if row.tag not in tags]
 
 
-def _changed(tag: str, **changes: object) -> Callable[[list[Mapping]], list[Mapping]]:
+def _changed(tag: str, **changes: object) -> Change:
     return lambda rows: [replace(row, **changes) if row.tag == tag else row  # type: ignore
                          for row in rows]
 
 
-RELOADS: dict[str, Callable[[list[Mapping]], list[Mapping]]] = {
+def _bits(rows: list[Mapping]) -> list[Mapping]:
+    """Return rows with outputs of one bit each, of a word that is written back as a whole."""
+    old = [replace(row, processor=Processor.ML1000) for row in rows]
+    for tag, place, values in (('w0_1', 'N7:0/4', (0,)), ('free_1', 'N7:0/3', None)):
+        old = _changed(tag, address=parse_address(place, PlcType.SLC), type=ValueType.BOOL,
+                       fallback=values and Fallback(values, _AFTER))(old)
+    return old
+
+
+def _long(rows: list[Mapping]) -> list[Mapping]:
+    """Return rows with an output that is written in two packets."""
+    return _changed('w0_1', address=parse_address('N7:30', PlcType.SLC), length=_TWO_PACKETS,
+                    fallback=Fallback(_TWO_PACKETS * (SAFE,), _AFTER))(
+        [replace(row, processor=Processor.SLC_5_01) for row in rows])
+
+
+RELOADS: dict[str, Change] = {
     'same': list,
     'speed gone': lambda rows: _without('w0_1')(_changed('beat_1', condition=None)(rows)),
     'speed bare': _changed('w0_1', fallback=None),
@@ -61,7 +86,8 @@ class Scene:
     At each of the ``slots`` (s) one of the ``events`` may happen. Each write to a word of
     ``fates_of`` may have one of the ``fates``, and may meet one of the events of ``meets``:
     ``f`` is the output, ``h`` the heartbeat, ``w`` the row without Fallback, ``g`` what a guest
-    writes.
+    writes. ``rows`` returns what becomes of the rows of the plant, ``called`` are those that the
+    messages are for.
     """
 
     name: str
@@ -71,12 +97,18 @@ class Scene:
     events: tuple[str, ...] = ()
     fates: tuple[str, ...] = ()
     fates_of: str = 'fg'
+    until: float = 4.0  # s: later writes have no fates
     meets: tuple[str, ...] = ()
     first: str = 'same'  # of RELOADS: the rows before the first reload
+    rows: Change = list
+    equals: tuple[float, ...] = ()  # s, when the last message of the output comes once more
+    called: tuple[str, ...] = ('w0_1',)
+    is_refreshed: bool = False  # Fallbacks that stand are written again, each second
+    is_read_back: bool = True  # heartbeats
 
 
 def _plant(mode: str = 'Peer', **others: object) -> Plant:
-    usual = Plant(mode, rows=1, baud=38400, after=700, period=500, requires=600)
+    usual = Plant(mode, rows=1, baud=38400, after=_AFTER, period=500, requires=600)
     return replace(usual, **others)  # type: ignore[arg-type]
 
 
@@ -85,7 +117,10 @@ def _slots(first: float = 0.05, last: float = 3.4, step: float = 0.3) -> tuple[f
 
 
 _CALLED = (0.8, 1.2, 1.6)
+_BOTH = ('w0_1', 'w0_2')
 _FREE = _plant(requires=None)  # its heartbeat counts without messages
+# An output that is read, and whose equal messages may be left out.
+_AGAIN = _changed('w0_1', command=Command.READ_WRITE, write_again=1500, period=150)
 
 _LARGE = (
     Scene('direct', _plant(), _CALLED, _slots(), EVENTS, DIRECT, 'fgh'),
@@ -96,7 +131,8 @@ _LARGE = (
     Scene('standard', _plant('Standard'), _CALLED, _slots(), EVENTS, DIRECT, 'fgh'),
     Scene('radio', _plant('Radio'), _CALLED, _slots(), EVENTS, DIRECT, 'fgh'),
     Scene('stored', _plant(may_store=True), _CALLED, _slots(), EVENTS, DIRECT, 'fgh'),
-    Scene('two', _plant('Message', stations=2), _CALLED, _slots(), EVENTS, DIRECT, 'fgh'),
+    Scene('two', _plant('Message', stations=2), _CALLED, _slots(), EVENTS, DIRECT, 'fgh',
+          called=_BOTH),
     Scene('read', _plant('Gateway', held=21), _CALLED, _slots(), EVENTS, GATEWAY, 'fgh'))
 # Few ways each: all pairs of them in seconds.
 _SMALL = (
@@ -129,6 +165,77 @@ _SMALL = (
           fates=('kept last', 'kept 1', 'sts last')),
     Scene('little gets', _plant(), slots=(1.2,), fates_of='f', first='speed bare',
           events=('reload same', 'guest speed', 'message'),
-          fates=('kept last', 'kept 1', 'sts last'), meets=('reload same', 'unplug 0.5')))
+          fates=('kept last', 'kept 1', 'sts last'), meets=('reload same', 'unplug 0.5')),
+    Scene('little again', _plant(after=1500), slots=(1.3,), until=2.4, equals=(1.2, 1.6),
+          rows=_AGAIN,
+          events=('equal', 'message', 'guest speed', 'overwrite', 'program 0.5', 'silent 0.7',
+                  'reload same', 'polling 0.4'),
+          fates=('no reply', 'refused', 'kept last', 'kept 1', 'sts last')),
+    Scene('little again via', _plant('Gateway', after=1500), slots=(0.05, 1.3), until=2.4,
+          equals=(1.2, 1.6), rows=_AGAIN,
+          events=('before speed last', 'guest speed', 'guest unknown'),
+          fates=('not delivered', 'told undelivered', 'kept last')),
+    Scene('little bits', _plant(kind='SLC'), slots=(0.9, 1.3), until=2.4, rows=_bits,
+          called=('w0_1', 'free_1'), fates_of='fw',
+          events=('publish free_1', 'message', 'reload same'),
+          fates=('no reply', 'kept last', 'kept 1')),
+    Scene('little long', _plant(kind='SLC'), slots=(0.9, 1.35), until=2.4, rows=_long,
+          events=('message', 'guest speed', 'still 0.4', 'polling 0.4'),
+          fates=('no reply', 'lost', 'refused', 'kept last', 'kept 1')),
+    Scene('little clocks', _plant(), _CALLED, (0.7, 1.1, 1.7), until=2.4,
+          events=('ahead 0.06', 'ahead 0.3', 'set 1.0', 'set -1.0', 'still 0.4', 'message 0.5')),
+    Scene('little refreshed', _plant(), slots=(0.6, 1.75), until=2.4, is_refreshed=True,
+          events=('overwrite', 'guest speed', 'guest unknown', 'silent 0.7', 'message'),
+          fates=('no reply', 'refused', 'kept last')),
+    Scene('little unread', _plant(), slots=(0.3, 1.35, 1.8), fates_of='h', until=2.4,
+          is_read_back=False, events=('guest beat', 'message', 'silent 0.7', 'program 3.0'),
+          fates=('no reply', 'refused', 'kept last', 'kept 1')),
+    Scene('little two', _plant('Message', stations=2), slots=(0.9, 1.75), called=_BOTH,
+          until=2.4, equals=(1.2,), rows=_AGAIN,
+          events=('guest speed 255', 'guest speed 2', 'silent 0.7', 'reload same', 'end 0.3'),
+          fates=('no reply', 'kept last', 'sts 1')),
+    Scene('little crowd', _plant(), slots=(0.78, 0.9, 1.3), fates_of='f', until=2.4,
+          events=('crowd 0.5', 'message', 'kill 0.3', 'reload same', 'polling 0.4'),
+          fates=('no reply', 'kept last'), meets=('crowd 0.1',)),
+    Scene('little stored', _plant(may_store=True), slots=(0.4, 0.95, 1.75), until=2.4,
+          events=('queued 0.7', 'message', 'guest speed', 'reload same'), fates=('no reply',)),
+    Scene('little radio', _plant('Radio'), slots=(0.9, 1.75), until=2.4,
+          events=('guest speed', 'silent 0.7', 'polling 0.4', 'kill 0.3'),
+          fates=('no reply', 'lost', 'kept last')),
+    Scene('little standard', _plant('Standard', baud=9600), slots=(0.9, 1.75), until=2.4,
+          events=('guest speed', 'silent 0.7', 'reload same'), fates=('no reply', 'kept last')),
+    Scene('little slave', _plant('Slave', baud=19200, stations=2), slots=(0.9, 1.75), until=2.4,
+          rows=_AGAIN, called=(*_BOTH, 'served'), equals=(1.4,),
+          events=('guest speed', 'silent 0.7', 'reload same'), fates=('no reply', 'sts last')))
 SCENES = {scene.name: scene for scene in (*_SMALL, *_LARGE)}
 SMALL = tuple(scene.name for scene in _SMALL)
+
+
+class Kind(Enum):
+    """A kind of row, or what else writes its words."""
+
+    FALLBACK = 'a row with Fallback'
+    HEARTBEAT = 'a heartbeat with While'
+    READ_WRITE = 'a ReadWrite row'
+    AGAIN = 'a row with Write_Again'
+    GUEST = "a guest's words"
+    GATEWAY = 'a row behind a gateway'
+    SERVED = 'a Serve row'
+    STATIONS = 'two stations'
+
+
+def kinds_of(scene: Scene) -> set[Kind]:
+    """Return all kinds of a scene."""
+    rows = scene.rows(scene.plant.mappings())
+    options = {*scene.events, *scene.meets, *scene.fates}
+    found = {
+        Kind.FALLBACK: any(row.fallback and not row.serves for row in rows),
+        Kind.HEARTBEAT: any(row.is_heartbeat and row.condition for row in rows),
+        Kind.READ_WRITE: any(row.polls and row.writes for row in rows),
+        Kind.AGAIN: any(row.write_again for row in rows),
+        Kind.GUEST: any(option.startswith('guest') for option in options),
+        Kind.GATEWAY: scene.plant.gateway or any(
+            option.startswith(('sts', 'not', 'told')) for option in options),
+        Kind.SERVED: any(row.serves for row in rows),
+        Kind.STATIONS: scene.plant.stations > 1}
+    return {kind for kind, is_there in found.items() if is_there}

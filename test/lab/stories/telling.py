@@ -21,6 +21,7 @@ what the driver believes, and messages are written and heartbeats count again.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from collections.abc import Mapping as MappingType
 from dataclasses import dataclass
@@ -37,24 +38,25 @@ from abdf1_ros.settings.mapping import Mapping
 from simulate.rules import Broken, Judge
 from stories.scenes import RELOADS, Scene
 from support.world import (
-    BEAT,
     Execute,
     GUESTS,
     is_write,
     OTHERS,
-    OUTPUTS,
     SAFE,
     STEP,
     WatchedPlc,
     World,
 )
 
-_SPEED, _BEAT = 'w0_1', 'beat_1'
+_SPEED = 'w0_1'
+_TAGS = {'speed': _SPEED, 'beat': 'beat_1'}  # as events name them
 _FROM_BEFORE = GUESTS[-20:]  # what other programs wrote before the port was opened
-_FATES_UNTIL = 4.0  # s
 _LONGEST = 12.0  # s without anything new, until all is at rest
 _LAST = 0.03  # s before a write can land no more
 _GLANCE = 0.01  # s
+_REFRESHED = 3.0  # s after which each Fallback that stands has been written again
+# Messages until all is as at first, and as long as a clock that was ahead is remembered.
+_CALLS, _CALLS_AHEAD = 12, 42
 _RECOVERED = 2  # deviations from which on nobody looks whether all is as at first: it takes long
 
 
@@ -84,7 +86,8 @@ class Telling:
     def __init__(self, scene: Scene, story: MappingType[str, str]) -> None:
         self.scene = scene
         self.points: list[tuple[str, tuple[str, ...]]] = []
-        self.world = World(scene.plant, seed=1, change=RELOADS[scene.first])
+        self.world = World(scene.plant, 1, lambda rows: RELOADS[scene.first](scene.rows(rows)))
+        self._places = {row.tag: row.address for row in scene.rows(scene.plant.mappings())}
         self.world.pass_on = self._pass_on
         self._judge = Judge(self.world)
         self._story = story
@@ -94,10 +97,10 @@ class Telling:
         self._dead_until = -math.inf
         self._is_gateway_known = bool(scene.plant.gateway)  # or it has shown itself by an STS
         self._kept: list[Kept] = []
-        self._execute: Execute | None = None
+        self._executes: dict[int, Execute] = {}  # by station, once it has executed something
         self._ill_until = -math.inf
         self._last_news = self._mode_seen_at = 0.0
-        self._begins = self._writes_begin()
+        self._calls = _CALLS
 
     def came(self) -> Iterator[str]:
         """Return what PLCs have executed, and then all results."""
@@ -111,9 +114,11 @@ class Telling:
         scene, world = self.scene, self.world
         for when in scene.messages:
             world.at(when, self._publish)
+        for when in scene.equals:
+            world.at(when, self._publish_equal)
         for when in scene.slots:
             world.at(when, partial(self._event, f'at {when}', scene.events))
-        self._wait(max((*scene.messages, *scene.slots)) + STEP)
+        self._wait(max((*scene.messages, *scene.equals, *scene.slots)) + STEP)
         while why := self._why_unsettled():
             if world.line.now > self._last_news + _LONGEST:
                 raise Broken('Rest', f'not at rest: {why}', world)
@@ -125,8 +130,13 @@ class Telling:
     # How it goes on
 
     def _publish(self) -> None:
+        for row in self.world.rows.values():
+            if row.tag in self.scene.called:
+                self.world.publish(row)
+
+    def _publish_equal(self) -> None:
         if row := self.world.rows.get(_SPEED):
-            self.world.publish(row)
+            self.world.publish(row, is_equal=True)
 
     def _wait(self, seconds: float) -> None:
         world = self.world
@@ -165,13 +175,15 @@ class Telling:
 
     def _pass_on(self, watched: WatchedPlc, execute: Execute, command: Packet) -> Packet:
         """Let a write have its fate."""
-        self._execute = execute
-        if not is_write(command):
+        station = watched.plc.station
+        self._executes[station] = execute
+        if not is_write(command) or watched.lacks(command):
             return execute(command)
-        tag, value = self._meant(command)
+        meant = self.world.forms.meant(station, command.data)
+        tag, value = meant[:2] if meant else ('', int.from_bytes(command.data[-2:], 'little'))
         kind = 'g' if value in GUESTS else {'w': 'f', 'b': 'h'}.get(tag[:1], 'w')
         fate = ''
-        if kind in self.scene.fates_of and self.world.line.now < _FATES_UNTIL:
+        if kind in self.scene.fates_of and self.world.line.now < self.scene.until:
             self._writes += 1
             fate = self._choose(f'write {self._writes}', self.scene.fates)
             if self.scene.meets and (event := self._choose(
@@ -202,18 +214,6 @@ class Telling:
                         self.world.at(self.world.line.now + 0.002, partial(self._land, kept))
         return reply
 
-    def _writes_begin(self) -> dict[str, bytes]:
-        """Return how each write of a row begins, by tag."""
-        return {row.tag: row.dialect.write(row.address, b'\0\0')[1][:-2]
-                for row in self.world.rows.values()
-                if row.station == 1 and (row.writes or row.is_heartbeat)}
-
-    def _meant(self, command: Packet) -> tuple[str, int]:
-        """Return the row that a write goes to, and the value."""
-        tag = next((tag for tag, begin in self._begins.items()
-                    if command.data[:-2] == begin), '')
-        return tag, int.from_bytes(command.data[-2:], 'little')
-
     def _keep(self, kept: Kept) -> None:
         """Let a gateway keep a write, at most as long as rule 10 says after the write's end."""
         self._kept.append(kept)
@@ -238,9 +238,30 @@ class Telling:
 
     def publish(self, argument: str) -> None:
         """Publish a message, which may be so many seconds old."""
-        if _SPEED not in self.world.rows:
+        self._say(_SPEED, float(argument or 0.0))
+
+    def publish_equal(self, argument: str) -> None:
+        """Publish the last message once more."""
+        self._say(_SPEED, is_equal=True)
+
+    def publish_other(self, tag: str) -> None:
+        """Publish a message of another row."""
+        self._say(tag)
+
+    def _say(self, tag: str, late: float = 0.0, *, is_equal: bool = False) -> None:
+        if tag not in self.world.rows:
             raise Pointless
-        self.world.publish(self.world.rows[_SPEED], float(argument or 0.0))
+        self.world.publish(self.world.rows[tag], late, is_equal=is_equal)
+
+    def be_ahead(self, argument: str) -> None:
+        """Let the clock of the publishers be ahead by so many seconds, for a second."""
+        self.world.clocks.lead = float(argument)
+        self._calls = _CALLS_AHEAD
+        self.world.at(self.world.line.now + 1.0, lambda: setattr(self.world.clocks, 'lead', 0.0))
+
+    def set_clock(self, argument: str) -> None:
+        """Set the clock of the host by so many seconds."""
+        self.world.clocks.set(float(argument), self.world.line.now)
 
     def ask(self, argument: str) -> None:
         """Let a guest write a word, or what nobody knows."""
@@ -250,24 +271,24 @@ class Telling:
         if argument == 'unknown':
             world.command(1, 0x0F, b'\x68\0\0')
             return
-        address = world.plcs[1].place_of({'speed': OUTPUTS, 'beat': BEAT}[argument])
+        where, _, station = argument.partition(' ')
+        address = self._places[_TAGS[where]]
         dialect = world.rows['clock_1'].dialect  # the row of the word may be gone
-        world.command(1, *dialect.write(address, world.next_of_guests.to_bytes(2, 'little')))
+        world.command(int(station or 1), *dialect.write(
+            address, world.next_of_guests.to_bytes(2, 'little')))
 
     def deliver_from_before(self, argument: str) -> None:
         """Let the gateway deliver what another program sent before the port was opened."""
         world = self.world
         left = world.opened + world.held_for - _LAST - world.line.now
-        if left <= 0 or not world.driver.is_online or self._execute is None:
+        if left <= 0 or not world.driver.is_online or 1 not in self._executes:
             raise Pointless
-        watched = world.plcs[1]
         dialect = world.rows['clock_1'].dialect
         word, _, when = argument.partition(' ')
         value = _FROM_BEFORE[len(self._kept)]
-        place = {'speed': OUTPUTS, 'beat': BEAT}[word]
-        cmd, data = dialect.write(watched.place_of(place), value.to_bytes(2, 'little'))
+        cmd, data = dialect.write(self._places[_TAGS[word]], value.to_bytes(2, 'little'))
         self._mark()
-        kept = Kept(Packet(1, 77, cmd, 0, 1, data), self._execute, watched.tags.get(place, ''),
+        kept = Kept(Packet(1, 77, cmd, 0, 1, data), self._executes[1], _TAGS[word],
                     0 if when == 'last' else int(when), -1)
         self._kept.append(kept)
         world.at(world.line.now + left, partial(self._land, kept))
@@ -317,6 +338,20 @@ class Telling:
         self._mark(float(argument))
         self._open_again(float(argument))
 
+    def be_queued(self, argument: str) -> None:
+        """Connect again to a device server that another client has the line of, for seconds."""
+        if not self.world.driver.is_online:
+            raise Pointless
+        self._ail(argument, self.world.be_queued,
+                  lambda: setattr(self.world, 'is_queued', False))
+
+    def crowd(self, argument: str) -> None:
+        """Let a second program publish to the output for so many seconds."""
+        if _SPEED not in self.world.rows:
+            raise Pointless
+        self.world.crowd(self.world.rows[_SPEED])
+        self.world.at(self.world.line.now + float(argument), self.world.part)
+
     def end(self, argument: str) -> None:
         """End in order, as after a signal; another process begins so many seconds later."""
         def ended() -> None:
@@ -344,10 +379,9 @@ class Telling:
                 return
             self._cut_off()
             self.world.use(rows)
-            self._begins = self._writes_begin()
 
         until = self.world.line.now + HAND_OVER
-        rows = RELOADS[argument](self.world.plant.mappings())
+        rows = RELOADS[argument](self.scene.rows(self.world.plant.mappings()))
         safe = {(row.extent, row.fallback) for row in rows}
         self._wind_down(HAND_OVER, ended, lambda row: (row.extent, row.fallback) not in safe)
 
@@ -387,17 +421,21 @@ class Telling:
 
     def _demand_named(self) -> None:
         """Demand that the end names each word that is not safe; none if nothing was wrong (5)."""
-        watched, interlocks = self.world.plcs[1], self.world.driver.interlocks
+        end = self.world.driver.interlocks.end
         named = {text.split(' ')[0] for text in (
-            *interlocks.end.unconfirmed(self.world.line.now), *interlocks.end.not_repeated())}
+            *end.unconfirmed(self.world.line.now), *end.not_repeated())}
         is_well = self._ill_until == -math.inf
-        for row in (*interlocks.fallbacks, *interlocks.heartbeats):
-            tag = row.mapping.tag
-            value = watched.word(str(row.mapping.address))
-            is_told = tag in named and not is_well
-            if value not in (0, SAFE) and not is_told and not self._is_unknowable(tag):
-                raise Broken('Named', f'the end does not name {tag}, which holds {value} (5)',
+        for row, value in self._own_words():
+            is_told = row.tag in named and not is_well
+            if value not in (0, SAFE) and not is_told and not self._is_unknowable(row.tag):
+                raise Broken('Named', f'the end does not name {row.tag}, which holds {value} (5)',
                              self.world)
+
+    def _own_words(self) -> Iterator[tuple[Mapping, int]]:
+        """Yield the rows of PLCs that we write by ourselves, and what they hold."""
+        for row in self.world.rows.values():
+            if row.is_own:
+                yield row, self.world.plcs[row.station].held(row)
 
     def _run_again(self) -> None:
         self._turn(Setting.RUN)
@@ -416,21 +454,30 @@ class Telling:
     def _why_unsettled(self) -> str:
         """Return why the plant is not at rest, empty if it is."""
         world, driver = self.world, self.world.driver
-        told = {(result.mapping.tag, result.value.strip('[]')) for result in world.results}
+        told = {result.request for result in world.results}
+        overwritten = max(world.overwritten.values(), default=-math.inf)
         reasons = {
             'something is wrong': world.line.now <= self._ill_until + 2 * STEP,
             'a mode that is not seen': world.line.now <= self._mode_seen_at + 2 * STEP,
+            'a clock': world.clocks.lead,
             'the port': not driver.is_online,
             'the gateway': any(not kept.is_done for kept in self._kept),
             'commands': driver.guests.waiting or any(
                 is_write(job.command) for job in driver.tasks.under_way),
-            'results': any((tag, str(value)) not in told
-                           for tag, value in world.keys[self._forgotten:]),
+            'results': any(str(number) not in told
+                           for number in range(self._forgotten, len(world.keys))),
             'a fallback': any(row.state is not FallbackState.STANDS or not row.is_confirmed
                               for row in driver.interlocks.fallbacks),
             'a heartbeat': any(beat.topics and not beat.is_confirmed
-                               for beat in driver.interlocks.heartbeats)}
+                               for beat in driver.interlocks.heartbeats),
+            'a refresh': self.scene.is_refreshed and world.line.now < overwritten + _REFRESHED,
+            'our table': world.master and self._served not in (None, SAFE)}
         return next((reason for reason, is_so in reasons.items() if is_so), '')
+
+    @property
+    def _served(self) -> int | None:
+        """Return what the master has read of our output last, None where nobody reads it."""
+        return self.world.served[-1][1] if self.world.served else None
 
     def _is_unknowable(self, tag: str) -> bool:
         """Tell whether a gateway that nobody can know of has delivered a command from before."""
@@ -440,39 +487,41 @@ class Telling:
 
     def _demand_belief(self) -> None:
         """Demand that each word holds what the driver believes: a Fallback, or 0."""
-        interlocks = self.world.driver.interlocks
-        for row in (*interlocks.fallbacks,
-                    *(beat for beat in interlocks.heartbeats if beat.topics)):
-            tag = row.mapping.tag
-            watched = self.world.plcs[row.mapping.station]
-            value = watched.word(watched.places[tag])
-            if self._is_unknowable(tag):
+        unseen = () if self.scene.is_refreshed else (OTHERS,)
+        for row, value in self._own_words():
+            if row.is_heartbeat and not (row.condition and row.condition.names) \
+                    or self._is_unknowable(row.tag):
                 continue
-            if value not in (0 if tag.startswith('beat') else SAFE, OTHERS):
-                raise Broken('Belief', f'{tag} is at rest for the driver, and holds {value}',
+            if value not in (0 if row.is_heartbeat else SAFE, *unseen):
+                raise Broken('Belief', f'{row.tag} is at rest for the driver, and holds {value}',
                              self.world)
 
     def _recover(self) -> None:
-        """Demand that a message is written, and that the heartbeat counts."""
+        """Demand that messages are written, and that the heartbeats count."""
         world = self.world
         results, executed = len(world.results), len(world.executed)
-        for _ in range(12):
+        wanted = {row.tag for row in world.rows.values()
+                  if row.tag in self.scene.called or row.is_heartbeat}
+        for _ in range(self._calls):
             self._publish()
             self._wait(0.35)
-        is_written = any(result.outcome is Outcome.WRITTEN for result in world.results[results:])
-        counts = any(entry.tag == _BEAT and entry.value for entry in world.executed[executed:])
-        if not is_written and _SPEED in world.rows:
-            raise Broken('Recovery', 'no message is written', world)
-        if not counts and _BEAT in world.rows:
-            raise Broken('Recovery', 'the heartbeat does not count', world)
+            done = {result.mapping.tag for result in world.results[results:]
+                    if result.outcome in (Outcome.WRITTEN, Outcome.STANDS)}
+            counted = Counter(entry.tag for entry in world.executed[executed:] if entry.value)
+            done |= {tag for tag, count in counted.items() if count > 1}
+            wanted -= done
+            if not wanted and world.line.now > self.scene.until:
+                return
+        raise Broken('Recovery', f'not written, or does not count: {sorted(wanted)}', world)
 
 
 _STATUS = {'refused': 0x10, 'not': 0x02, 'sts': 0x02}
 
 _EVENTS: dict[str, Callable[[Telling, str], None]] = {
-    'message': Telling.publish, 'guest': Telling.ask, 'before': Telling.deliver_from_before,
-    'overwrite': Telling.overwrite, 'silent': Telling.fall_silent,
-    'program': Telling.stop_program, 'download': Telling.download,
+    'message': Telling.publish, 'equal': Telling.publish_equal, 'publish': Telling.publish_other,
+    'ahead': Telling.be_ahead, 'set': Telling.set_clock, 'guest': Telling.ask,
+    'before': Telling.deliver_from_before, 'overwrite': Telling.overwrite,
+    'silent': Telling.fall_silent, 'program': Telling.stop_program, 'download': Telling.download,
     'still': Telling.stand_still, 'executor': Telling.hang_executor, 'kill': Telling.kill,
-    'unplug': Telling.unplug, 'end': Telling.end, 'polling': Telling.hand_port_over,
-    'reload': Telling.reload}
+    'crowd': Telling.crowd, 'queued': Telling.be_queued, 'unplug': Telling.unplug,
+    'end': Telling.end, 'polling': Telling.hand_port_over, 'reload': Telling.reload}

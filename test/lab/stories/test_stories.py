@@ -16,6 +16,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import combinations
 import math
 from pathlib import Path
 from typing import Any
@@ -24,7 +25,7 @@ from unittest import mock
 from abdf1_ros.driver.flights import Flights, Words
 from abdf1_ros.driver.interlocks.end import OrderlyEnd
 import pytest
-from stories.scenes import SCENES, SMALL
+from stories.scenes import Kind, kinds_of, SCENES, SMALL
 from stories.walk import Ledger, shortest, story_of, tell, text_of, Walk
 from support.cases import compare_stored, long_unless
 
@@ -48,6 +49,12 @@ def test_all_stories_keep_the_rules_and_reach_what_is_stored(name: str, deviatio
     compare_stored(_STORED / f'{name} {deviations}.txt'.replace(' ', '_'), reached)
 
 
+def test_each_pair_of_kinds_is_in_a_scene_that_is_walked_through() -> None:
+    found = {pair for name in SMALL for pair in combinations(Kind, 2)
+             if kinds_of(SCENES[name]).issuperset(pair)}
+    assert {*combinations(Kind, 2)} - found == set()
+
+
 @pytest.mark.parametrize(('name', 'text'), [
     *((name, '') for name in SCENES if name not in SMALL),
     # A guest writes the word of a row that new files do not have.
@@ -66,7 +73,13 @@ def test_story_of_a_large_scene_can_be_told(name: str, text: str) -> None:
     # A guest over a 0 whose next number was refused.
     ('sts', 'write 3: refused\nat 0.95: guest beat'),
     # Our own late number after new files.
-    ('sts', 'at 1.25: reload speed gone\nwrite 6: kept last')])
+    ('sts', 'at 1.25: reload speed gone\nwrite 6: kept last'),
+    # A row without Fallback in new files takes what came before the last Fallback of the old ones.
+    ('direct', 'at 0.05: still 0.4\nat 0.65: reload speed bare'),
+    # New files without the heartbeat of one station, and with that of another.
+    ('two', 'at 0.05: reload beat gone'),
+    # A process that is killed in the moment in which its number goes out.
+    ('little crowd', 'at 1.3: kill 0.3')])
 def test_story_that_was_told_wrongly_once(name: str, text: str) -> None:
     assert tell_broken(name, text) == ''
 

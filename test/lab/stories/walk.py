@@ -36,6 +36,7 @@ from __future__ import annotations
 import argparse
 from collections import Counter
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 import hashlib
 from itertools import combinations
@@ -52,6 +53,7 @@ if __name__ == '__main__':  # pytest has its own paths
     sys.path[:0] = [str(Path(__file__).parents[number]) for number in (1, 2, 3)]
 
 from abdf1_ros.driver.interlocks import fallback, plc
+from abdf1_ros.driver.interlocks.heartbeat import HeartbeatRow
 from simulate.rules import Broken
 from stories.scenes import Scene, SCENES
 from stories.telling import Pointless, Telling
@@ -59,7 +61,7 @@ from stories.telling import Pointless, Telling
 Story = dict[str, str]
 
 _MOST_SHOWN = 10
-_NEVER = 1e6  # s
+_NEVER, _OFTEN = 1e6, 1.0  # s, between two writes of a Fallback that stands
 
 
 def text_of(story: Story) -> str:
@@ -88,12 +90,17 @@ def tell(scene: Scene, story: Story) -> Told | None:
     """
     Tell a story; None if a deviation of it changes nothing.
 
-    Fallbacks that stand are not written again (rule 8): that would hide for seconds what a word
-    must not hold.
+    Only where the scene says so are Fallbacks that stand written again, and heartbeats read back
+    (rules 8 and 19): both hide for seconds what a word must not hold.
     """
     broken = ''
-    with mock.patch.object(fallback, 'LEAST_REFRESH', _NEVER), \
-            mock.patch.object(plc, 'LEAST_REFRESH', _NEVER):
+    with ExitStack() as stack:
+        for module in (fallback, plc):
+            stack.enter_context(mock.patch.object(
+                module, 'LEAST_REFRESH', _OFTEN if scene.is_refreshed else _NEVER))
+        if not scene.is_read_back:
+            stack.enter_context(mock.patch.object(
+                HeartbeatRow, 'read_back', lambda self, *arguments: ''))
         telling = Telling(scene, story)
         try:
             telling.tell()
