@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Other names of PLC families and value types, and what the CSV files call these."""
+"""Names of PLC families, processors and value types, and what the CSV files call these."""
 
 from __future__ import annotations
 
@@ -20,9 +20,15 @@ import re
 
 # Processors and catalog numbers of a family: 5/03, ML1400, 1747-L531; PLC-5/40, 1785-L40B.
 _FAMILIES = (
-    (re.compile(r'SLC(?:500|5/0[1-5])|5/0[1-5]|(?:MICROLOGIX|ML)(?:1[0-5]00)?|1747.*|176[1-6].*'),
+    (re.compile(r'SLC[\d/]*|5/0?[1-5]|(?:MICROLOGIX|MLX?)(?:1[0-5]00.*)?|1747.*|176[1-6].*'),
      'SLC'),
-    (re.compile(r'PLC5/\d\d.*|5/[1-8][05]|1785.*'), 'PLC5'))
+    (re.compile(r'PLC5[\d/]*[CELV]?|5/[1-8]\d|1785.*'), 'PLC5'),
+    (re.compile(r'PLC3(?:/10)?|1775.*'), 'PLC3'), (re.compile(r'PLC2(?:/\d\d)?'), 'PLC2'))
+_OTHERS = (
+    (re.compile(r'[A-Z]*(?<!RS)(?<!MICRO)LOGIX.*|CLX|1756.*|1768.*|1769L.*|5069.*|5[35][78]0.*'), (
+        'a Logix controller has only the addresses of its "Map PLC/SLC Messages" here: choose SLC '
+        'or PLC5 for them; libplctag and pycomm3 read its tags')),
+    (re.compile('MICRO8.*|2080.*'), 'a Micro800 has no DF1 commands; it has Modbus RTU'))
 _MICROLOGIX = re.compile(r'(?:MICROLOGIX|ML)?(1[0-5]00)', re.IGNORECASE)
 _SLC = re.compile(r'(?:SLC-?)?5(?:[/-]0?|0)([1-5])', re.IGNORECASE)
 _TYPES = {'int': 'int16', 'word': 'uint16', 'dint': 'int32', 'long': 'int32', 'dword': 'uint32',
@@ -33,6 +39,13 @@ def family_name(text: str) -> str:
     """Return the PLC_Type for a name such as PLC-5; any text in capitals, without - and spaces."""
     name = text.upper().replace('-', '').replace(' ', '')
     return next((family for names, family in _FAMILIES if names.fullmatch(name)), name)
+
+
+def family_advice(text: str) -> str:
+    """Return what to choose as PLC_Type for the name of something else."""
+    name = text.upper().replace('-', '').replace(' ', '')
+    return next((advice for names, advice in _OTHERS if names.fullmatch(name)),
+                'a MicroLogix is SLC')
 
 
 def processor_name(text: str) -> str:

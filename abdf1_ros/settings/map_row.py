@@ -29,7 +29,7 @@ from abdf1_ros.pccc.address_range import AddressRange
 from abdf1_ros.pccc.families import FAMILIES, parse_range
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.processor import Processor
-from abdf1_ros.pccc.spellings import family_name
+from abdf1_ros.pccc.spellings import family_advice, family_name
 from abdf1_ros.pccc.structures import bits_fault, order_fault, type_fault, write_fault, wrong_type
 from abdf1_ros.pccc.values import types_of, ValueType
 from abdf1_ros.problems import Problem
@@ -208,8 +208,8 @@ class RowReader:
         text = self._row.get('PLC_Type')
         kind = next((entry for entry in FAMILIES if entry.value == family_name(text)), None)
         if kind is None:
-            self._fault('PLC_Type', f'a MicroLogix is SLC{hint(text)}', Message.ERR_BAD_PLC_TYPE,
-                        shown(text), *_PLC_TYPE_NAMES)
+            self._fault('PLC_Type', f'{family_advice(text)}{hint(text)}',
+                        Message.ERR_BAD_PLC_TYPE, shown(text), *_PLC_TYPE_NAMES)
         return kind
 
     def _access(self, plc_type: PlcType, command: Command | None) -> Access | None:

@@ -20,7 +20,7 @@ from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.members import Members
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.slc.address import BY_CODE
-from abdf1_ros.pccc.spellings import family_name, processor_name
+from abdf1_ros.pccc.spellings import family_advice, family_name, processor_name
 import pytest
 from support.cases import for_all
 
@@ -221,12 +221,25 @@ def test_packet_has_an_element_at_least_so_that_a_plc_that_lacks_the_file_can_re
 
 
 @for_all(('text', 'family', 'processor'), [
-    ('SLC 500', 'SLC', 'SLC 500'), ('5/03', 'SLC', '5/03'), ('SLC 5/3', 'SLC5/3', '5/03'),
+    ('SLC 500', 'SLC', 'SLC 500'), ('5/03', 'SLC', '5/03'), ('SLC 5/3', 'SLC', '5/03'),
     ('slc-5/04', 'SLC', '5/04'), ('ML1400', 'SLC', 'ML1400'),
     ('MicroLogix 1100', 'SLC', 'ML1100'), ('1747-L531', 'SLC', '1747-L531'),
     ('PLC-5', 'PLC5', 'PLC-5'), ('PLC-5/40E', 'PLC5', 'PLC-5/40E'), ('5/40', 'PLC5', '5/40'),
     ('1785-L40B', 'PLC5', '1785-L40B'), ('plc2', 'PLC2', 'plc2'), ('S7', 'S7', 'S7'),
+    ('SLC504', 'SLC', '5/04'), ('5/4', 'SLC', '5/04'), ('MLX', 'SLC', 'MLX'),
+    ('PLC5-40', 'PLC5', 'PLC5-40'), ('PLC-5E', 'PLC5', 'PLC-5E'), ('5/11', 'PLC5', '5/11'),
+    ('PLC-3/10', 'PLC3', 'PLC-3/10'), ('PLC-2/30', 'PLC2', 'PLC-2/30'),
     ('ControlLogix', 'CONTROLLOGIX', 'ControlLogix'), ('1400', '1400', 'ML1400')])
 def test_names_of_processors_lead_to_their_family(
         text: str, family: str, processor: str) -> None:
     assert (family_name(text), processor_name(text)) == (family, processor)
+
+
+@for_all(('text', 'advice'), [
+    *((text, 'Map PLC/SLC Messages') for text in (
+        'logix', 'Control Logix', 'CompactLogix', 'GuardLogix', 'CLX', '1756-L61', '1769-L32E',
+        '5380')),
+    ('Micro850', 'no DF1'), *((text, 'a MicroLogix is SLC') for text in (
+        'MicroLogix 9', 'RSLogix 500', 'S7', ''))])
+def test_name_of_another_family_leads_to_what_to_choose(text: str, advice: str) -> None:
+    assert advice in family_advice(text)

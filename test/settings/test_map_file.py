@@ -198,6 +198,9 @@ def test_command_says_whether_a_row_reads_and_writes(text: str, reads: bool, wri
     ({'PLC_Type': 'S7'},
      '5 (PLC_Type): 2502 ERR_BAD_PLC_TYPE: Item: 1, Invalid or Unsupported PLC Type (S7) should '
      'be one of PLC2, PLC3, PLC5, SLC; a MicroLogix is SLC'),
+    ({'PLC_Type': 'Micro850'},
+     '5 (PLC_Type): 2502 ERR_BAD_PLC_TYPE: Item: 1, Invalid or Unsupported PLC Type (Micro850) '
+     'should be one of PLC2, PLC3, PLC5, SLC; a Micro800 has no DF1 commands; it has Modbus RTU'),
     ({'Address': 'N7'}, '3 (Address): 2503 ERR_ADDRESS_SYNTAX: Item: 1, Invalid Address Syntax '
      '(N7); an element is missing, as in N7:0'),
     *(({'Address': 'N7:2000', 'Length': cell}, '3 (Address): 2504 ERR_ADDRESS_RANGE: Item: 1, '

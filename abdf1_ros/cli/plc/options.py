@@ -29,7 +29,7 @@ from abdf1_ros.paths import expanded
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.processor import Processor
-from abdf1_ros.pccc.spellings import family_name, processor_name, type_name
+from abdf1_ros.pccc.spellings import family_advice, family_name, processor_name, type_name
 from abdf1_ros.pccc.values import ValueType, WordOrder
 from abdf1_ros.settings import BAUD_RATES
 from abdf1_ros.settings.station_lists import parse_stations
@@ -49,6 +49,7 @@ class LineDefaults:
     net: str = 'the line'
 
 
+_FAMILY_NAMES = [kind.value for kind in FAMILIES]
 RADIXES = {'dec': Radix.DECIMAL, 'hex': Radix.HEXADECIMAL, 'oct': Radix.OCTAL, 'bin': Radix.BINARY}
 
 _TRIED = 'tries all'
@@ -69,8 +70,8 @@ def add_plc_type(parser: argparse._ActionsContainer,
                  text: str = 'family of the PLC (default: the PLC is asked)',
                  default: str | None = None) -> None:
     """Add the option for the family of the PLC."""
-    parser.add_argument('--plc-type', type=family_name, choices=[kind.value for kind in FAMILIES],
-                        default=default, help=text)
+    parser.add_argument('--plc-type', type=_family, default=default,
+                        metavar=f'{{{",".join(_FAMILY_NAMES)}}}', help=text)
 
 
 def add_folder(parser: argparse.ArgumentParser, what: str) -> None:
@@ -194,6 +195,14 @@ def stations_option(text: str, right: str = '') -> tuple[int, ...]:
     if faults or not stations:
         raise argparse.ArgumentTypeError(right or '; '.join(faults) or 'give a station')
     return stations
+
+
+def _family(text: str) -> str:
+    name = family_name(text)
+    if name not in _FAMILY_NAMES:
+        raise argparse.ArgumentTypeError(
+            f'"{text}" should be one of {", ".join(_FAMILY_NAMES)}; {family_advice(text)}')
+    return name
 
 
 def _station(text: str) -> int:

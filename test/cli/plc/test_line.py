@@ -246,3 +246,11 @@ def test_types_and_families_have_the_names_of_the_field(said: str, kind: str, fa
     options = make_parser(None).parse_args([
         'read', 'N7:0', '--type', words[0], '--plc-type', words[1]])
     assert (options.type, options.plc_type) == (kind, family)
+
+
+def test_family_that_is_none_leads_to_what_to_choose(capsys: pytest.CaptureFixture[str]) -> None:
+    assert parse('read', 'N7:0', '--plc-type', 'SLC 5/04').plc_type == 'SLC'
+    with pytest.raises(SystemExit):
+        parse('read', 'N7:0', '--plc-type', 'logix')
+    assert ('argument --plc-type: "logix" should be one of PLC2, PLC3, PLC5, SLC; a Logix '
+            'controller has only') in capsys.readouterr().err
