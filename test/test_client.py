@@ -23,8 +23,6 @@ from inspect import signature
 from itertools import count
 import logging
 import math
-import multiprocessing
-import os
 from pathlib import Path
 import pickle
 import re
@@ -455,20 +453,19 @@ def test_client_stays_in_its_process(port: str) -> None:
         for copied in pickle.dumps, copy.copy:
             with pytest.raises(TypeError, match='^a Client cannot be pickled or copied, because'):
                 copied(plc)
-        reader, writer = multiprocessing.get_context('fork').Pipe(duplex=False)
-        child = os.fork()
-        if not child:
-            try:
-                plc.read('N7:0')
-            except PortLost as error:
-                writer.send((str(error), error.sent))
-            finally:
-                os._exit(0)
-        assert reader.poll(PATIENCE)
-        assert reader.recv() == ('N7:0 of station 1: port lost: another process has opened it; '
-                                 'each process needs a client of its own', False)
-        assert os.waitpid(child, 0)[1] == 0
-        assert plc.read('N7:0') == 0
+    program = ('import os, sys; from abdf1_ros import Client\n'
+               'with Client(sys.argv[1], duplex="half", plc_type="SLC") as plc:\n'
+               ' if os.fork():\n'
+               '  os.wait(); print(plc.read("N7:0"))\n'
+               ' else:\n'
+               '  try: plc.read("N7:0")\n'
+               '  except Exception as error: print(error, error.sent, flush=True)\n'
+               '  os._exit(0)')
+    said = subprocess.run([sys.executable, '-c', program, port], text=True, capture_output=True,
+                          timeout=PATIENCE, check=True)
+    assert said.stdout.splitlines() == [
+        'N7:0 of station 1: port lost: another process has opened it; each process needs a client '
+        'of its own False', '0']
 
 
 def test_call_in_the_last_moments_of_a_program_says_so(port: str) -> None:

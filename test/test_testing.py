@@ -97,14 +97,18 @@ def test_test_of_the_tutorial_passes(abdf1_cell: Cells) -> None:  # noqa: F811
 def test_plcs_of_the_tutorial_need_no_ros(tmp_path: Path) -> None:
     """Also where rclpy is missing; the fixture that needs it says so."""
     plugin, test = re.findall(r'```python\n(.*?)```', TUTORIAL, re.DOTALL)[::3]
+    shared = re.findall(r'```python\n(.*?)```', TUTORIAL, re.DOTALL)[4]
     (tmp_path / 'conftest.py').write_text(plugin, 'utf-8')
     (tmp_path / 'test_plcs.py').write_text(
         f'{test}\n\ndef test_cell(abdf1_cell):\n    pass\n', 'utf-8')
+    (tmp_path / 'test_shared.py').write_text(
+        f'{shared}\n\ndef test_sets(plcs):\n    plcs.set("N7:0", 5)\n'
+        '\n\ndef test_sees(plcs):\n    assert plcs.word("N7:0") == 5\n', 'utf-8')
     said = subprocess.run(
         [sys.executable, '-c', 'import sys; sys.modules["rclpy"] = None\nimport pytest; '
          'sys.exit(pytest.main(["-q", "-p", "no:cacheprovider"]))'], cwd=tmp_path, check=False,
         capture_output=True, text=True, timeout=60).stdout
-    assert '1 passed, 1 error' in said
+    assert '3 passed, 1 error' in said
     assert re.search(r'abdf1_cell needs ROS 2 \(.*rclpy.*\): is it sourced', said)
     assert 'Traceback' not in said and 'site-packages' not in said
 
@@ -122,6 +126,24 @@ def test_each_line_of_plcs_is_its_own(abdf1_plcs: Callable[..., Plcs]) -> None: 
         with Client.from_files(*files) as plant:
             plant.write('a', 9)
         assert line.word('N7:0', station) == 9
+
+
+@pytest.mark.parametrize(('call', 'text'), [
+    (lambda plcs: plcs.word('N7:0/1'), '^N7:0/1 is a bit of the word N7:0; a client'),
+    (lambda plcs: plcs.set('N7:0/1', 1), '^N7:0/1 is a bit'),
+    (lambda plcs: plcs.word('F8:0'), r'^F8:0 is a float32 of 2 words; a client\(\)'),
+    (lambda plcs: plcs.set('ST9:0', 1), '^ST9:0 is a string of 42 words'),
+    (lambda plcs: plcs.set('N7:0', 1.5), '^1.5 is not a word, from'),
+    (lambda plcs: plcs.set('N7:0', [1, 2]), r'^\[1, 2\] is not a word'),
+    (lambda plcs: plcs.set('N7:0'), '^None is not a word')])
+def test_fixture_takes_no_word_for_what_is_none(
+        call: Callable[[Plcs], object], text: str,
+        abdf1_plcs: Callable[..., Plcs]) -> None:  # noqa: F811
+    plcs = abdf1_plcs('Station,PLC_Type,Address\n1,SLC,N7:0\n1,SLC,F8:0\n1,SLC,ST9:0\n')
+    with pytest.raises(ValueError, match=text):
+        call(plcs)
+    with plcs.client() as plc:
+        assert plc.read('N7:0') == 0
 
 
 def test_what_never_happens_is_named(

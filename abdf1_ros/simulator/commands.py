@@ -94,7 +94,7 @@ def execute(line: str, plcs: Sequence[SimulatedPlc],
 
     ``report`` gets the result of a message later.
     """
-    verb, *words = line.split()
+    verb, *words = line.split() or ['']
     plc, arguments = _station(words, plcs)
     with plc.lock:
         return _carry_out(line, verb, plc, arguments, report)

@@ -17,16 +17,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 import threading
 import time
-from typing import Any
+from typing import Any, SupportsIndex
 
 from abdf1_ros.client import Client
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.machine import Machine
 from abdf1_ros.df1.slave import multidrop
+from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.families import parse_address
+from abdf1_ros.pccc.values import types_of
 from abdf1_ros.ports.endpoints import PtyEndpoint
 from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.simulator.commands import execute
@@ -94,18 +97,28 @@ class Plcs:
         execute(command, self._plcs)
 
     def word(self, address: str, station: int = 1) -> int:
-        """Return a word of a PLC, from 0 to 65535."""
+        """Return a word of a PLC, from 0 to 65535; raises ValueError for a bit, or more words."""
+        place = self._word_place(address, station)
         self[station].advance()
-        table = self[station].table
-        return int.from_bytes(table.read(parse_address(address, table.plc_type), 1), 'little')
+        return int.from_bytes(self[station].table.read(place, 1), 'little')
 
-    def set(self, address: str, *words: int, station: int = 1) -> None:  # noqa: A003
+    def set(self, address: str, *words: SupportsIndex, station: int = 1) -> None:  # noqa: A003
         """Set words of a PLC, as its program does; each from -32768 to 65535."""
-        for word in words:
-            if not -0x8000 <= word <= 0xFFFF:
-                raise ValueError(f'{word} is not a word, from -32768 to 65535')
+        place = self._word_place(address, station)
+        for word in words or [None]:
+            if not isinstance(word, SupportsIndex) or not -0x8000 <= word.__index__() <= 0xFFFF:
+                raise ValueError(f'{word!r} is not a word, from -32768 to 65535')
         self[station].advance()
-        table = self[station].table
         with self[station].lock:
-            table.write(parse_address(address, table.plc_type),
-                        b''.join((word & 0xFFFF).to_bytes(2, 'little') for word in words))
+            self[station].table.write(place, b''.join(
+                (word.__index__() & 0xFFFF).to_bytes(2, 'little') for word in words))
+
+    def _word_place(self, address: str, station: int) -> Address:
+        found = parse_address(address, self[station].table.plc_type)
+        if found.bit is not None:
+            raise ValueError(f'{address} is a bit of the word {replace(found, bit=None)}; a '
+                             'client() reads and writes single bits')
+        if (kind := types_of(found)[0]).words != 1:
+            raise ValueError(f'{address} is a {kind.value} of {kind.words} words; a client() '
+                             'reads and writes it')
+        return found
