@@ -20,13 +20,18 @@ import os
 from pathlib import Path
 import re
 import shlex
+import socket
 import subprocess
+import sys
+import time
 
 from abdf1_ros.cli.main import COMMANDS
 import pytest
 from support import documents
 from support.commands import call, Output, PATIENT
-from support.ros import Process
+from support.device_server import OWN_HOST
+from support.ptys import PATIENCE
+from support.ros import Process, ros_args
 
 PORT = '/tmp/plc'
 PAGES = [name for name in documents.NAMES if documents.blocks(documents.text(name), only_run=True)]
@@ -76,6 +81,27 @@ def test_marked_blocks_do_what_they_show(name: str, port: Path, tmp_path: Path,
             else:
                 subprocess.run(['bash', '-c', line], timeout=60, check=True)
                 assert shown == []
+
+
+def test_ethernet_page_reaches_a_simulated_plc(port: Path, tmp_path: Path) -> None:
+    pytest.importorskip('pycomm3')
+    page = documents.text('docs/ethernet.md').partition('## Without a PLC')[2]
+    with socket.create_server((OWN_HOST, 0)) as free:
+        number = free.getsockname()[1]
+    page = page.replace(PORT, str(port)).replace('eip:44818', f'eip:{OWN_HOST}:{number}').replace(
+        '127.0.0.1:44818', f'{OWN_HOST}:{number}')
+    files, program, *_ = documents.blocks(page)
+    for line in re.findall(r'^\$ (printf .*)$', files, re.MULTILINE):
+        subprocess.run(['bash', '-c', line], cwd=tmp_path, check=True)
+    with Process('node', *ros_args(f'net_file:={tmp_path}/net.csv',
+                                   f'map_file:={tmp_path}/map.csv')) as node:
+        node.wait_for(': open')
+        end = time.monotonic() + PATIENCE
+        while (told := subprocess.run([sys.executable, '-c', program], text=True, check=False,
+                                      capture_output=True)).returncode:
+            assert time.monotonic() < end, told.stderr
+        node.end()
+    assert told.stdout == '[[101, 102, 103, 104], 21.5]\n'
 
 
 def test_both_tutorials_at_the_line_are_run() -> None:
