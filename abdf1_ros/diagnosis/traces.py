@@ -123,6 +123,10 @@ class Traces:
         """Return the station of this line that was asked: the gateway, if there is one."""
         return self.station if self.gateway is None else self.gateway
 
+    def is_of(self, station: int | None) -> bool:
+        """Return True if a symbol to or from a station of the line belongs to the station."""
+        return not self.mode.is_master or station in (None, self.on_line)
+
     @property
     def other_check(self) -> str:
         """Return the name of the check that we do not use: BCC for CRC, CRC for BCC."""
@@ -175,32 +179,17 @@ def has_modbus(data: bytes) -> bool:
     return False
 
 
-@dataclass(frozen=True, slots=True)
-class LineAsked:
-    """Our settings, the station that was asked, and its gateway; ``cmd_timeout`` in s."""
-
-    mode: LineMode
-    check: Checksum
-    own: int
-    station: int
-    gateway: int | None
-    cmd_timeout: float
-
-    def is_of(self, station: int | None) -> bool:
-        """Return True if a symbol to or from a station of the line belongs to the station."""
-        return not self.mode.is_master or station in (None, self.on_line)
-
-    @property
-    def on_line(self) -> int:
-        """Return the station of this line that was asked: the gateway, if there is one."""
-        return self.station if self.gateway is None else self.gateway
-
-
 class _SymbolCount:
-    """Count the symbols of a line in both directions; ``traces`` has the result."""
+    """
+    Count the symbols of a line in both directions; ``traces`` has the result.
 
-    def __init__(self, chunks: Iterable[Chunk], asked: LineAsked, *, echoes: bool) -> None:
+    See ``traces_of`` for the arguments.
+    """
+
+    def __init__(self, chunks: Iterable[Chunk], asked: Traces, cmd_timeout: float, *,
+                 echoes: bool) -> None:
         self._of = asked
+        self._cmd_timeout = cmd_timeout
         self._counts: Counter[str] = Counter()
         self._masters: Counter[int] = Counter()
         self._asked: Kind | None = None  # what we have sent last
@@ -222,9 +211,9 @@ class _SymbolCount:
             self._take(entry)
         counts: dict[str, Any] = self._counts
         has_masters = asked.mode.is_master and self._masters.total() >= SURE
-        self.traces = Traces(
-            asked.mode, asked.check, asked.own, asked.station, asked.gateway, characters, first,
-            unasked, late=self._late, foreign=self._foreign, echoes=echoes,
+        self.traces = replace(
+            asked, characters=characters, first=first, unasked=unasked, late=self._late,
+            foreign=self._foreign, echoes=echoes,
             polled=asked.mode.is_polled and asked.own in self._masters,
             masters=tuple(sorted(self._masters)) if has_masters else (),
             foreign_polls=self._masters.total(), **counts)
@@ -260,7 +249,7 @@ class _SymbolCount:
             self._foreign = entry.packet.dst
         is_its = entry.packet.src == self._of.station or not self._of.mode.is_master
         if entry.latency is not None and is_its:
-            is_late = entry.latency > self._of.cmd_timeout
+            is_late = entry.latency > self._cmd_timeout
             self._counts['replies'] += not is_late
             self._late = max(self._late, entry.latency if is_late else 0.0)
 
@@ -280,16 +269,21 @@ def without_echo(chunks: Iterable[Chunk]) -> Iterator[Chunk]:
             yield chunk._replace(data=rest)
 
 
-def traces_of(chunks: Sequence[Chunk], asked: LineAsked, *, echoes: bool = False) -> Traces:
+def traces_of(chunks: Sequence[Chunk], asked: Traces, cmd_timeout: float, *,
+              echoes: bool = False) -> Traces:
     """
     Return what the bytes of a line have shown.
 
+    ``asked`` has our settings, the station that was asked, and what is known without the bytes.
+    ``cmd_timeout`` is in s. With ``echoes`` the line gives back what we send.
+
     If messages are damaged with our check and right with ``other_check``, the far end uses that.
     """
-    traces = _SymbolCount(chunks, asked, echoes=echoes).traces
+    traces = _SymbolCount(chunks, asked, cmd_timeout, echoes=echoes).traces
     if traces.damaged and not traces.replies:
         other = replace(asked, check=_other(asked.check))
-        if _SymbolCount(chunks, other, echoes=echoes).traces.damaged < traces.damaged:
+        again = _SymbolCount(chunks, other, cmd_timeout, echoes=echoes).traces
+        if again.damaged < traces.damaged:
             return replace(traces, takes_other_check=True)
     return traces
 

@@ -23,7 +23,7 @@ from abdf1_ros.df1.mode import LineMode
 from abdf1_ros.df1.peer import PEER
 from abdf1_ros.df1.slave_link import SLAVE
 from abdf1_ros.diagnosis.causes import Decider, diagnose, Rule, RULES
-from abdf1_ros.diagnosis.traces import has_modbus, LineAsked, Traces, traces_of, without_echo
+from abdf1_ros.diagnosis.traces import has_modbus, Traces, traces_of, without_echo
 from abdf1_ros.sniffer.capture import Chunk, Direction
 import pytest
 from support.cases import for_all
@@ -51,7 +51,7 @@ def seen(*parts: tuple[str, bytes], mode: LineMode = MASTER, check: Checksum = C
     """Return the traces of bytes that go out (">") and come in ("<"), ``step`` s apart."""
     chunks = [Chunk(number * step, Direction(way), data)
               for number, (way, data) in enumerate(parts)]
-    return traces_of(chunks, LineAsked(mode, check, 5, station, gateway, 1.0), echoes=echoes)
+    return traces_of(chunks, Traces(mode, check, 5, station, gateway), 1.0, echoes=echoes)
 
 
 def poll(station: int) -> bytes:

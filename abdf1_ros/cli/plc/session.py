@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 import time
 from typing import TypeVar
@@ -26,7 +25,7 @@ from typing import TypeVar
 from abdf1_ros import open_line
 from abdf1_ros.cli.terminal import NoPort, RED, tell
 from abdf1_ros.df1.stations import ActiveStationList, MAX_STATION
-from abdf1_ros.diagnosis.traces import LineAsked, Traces, traces_of
+from abdf1_ros.diagnosis.traces import Traces, traces_of
 from abdf1_ros.driver.evidence import evidence_of
 from abdf1_ros.errors import Abdf1Error, PortLost
 from abdf1_ros.pccc.dialect import Steps
@@ -68,12 +67,11 @@ class Witness:
                echoes: bool) -> Traces:
         """Return what the line has shown while a station was asked."""
         evidence = evidence_of(network.line_mode, stations, station)
-        asked = LineAsked(
+        asked = Traces(
             network.line_mode, network.checksum, network.station, station, evidence.gateway,
-            network.cmd_timeout / 1000)
-        return replace(
-            traces_of([*self.chunks], asked, echoes=echoes), other_number=evidence.other_number,
-            is_acknowledged=evidence.is_only_acknowledged, is_garbled=evidence.fault is not None)
+            other_number=evidence.other_number, is_acknowledged=evidence.is_only_acknowledged,
+            is_garbled=evidence.fault is not None)
+        return traces_of([*self.chunks], asked, network.cmd_timeout / 1000, echoes=echoes)
 
 
 class _Witnessed(PortAround):
