@@ -29,12 +29,19 @@ _ASKING = (Target.MASTER, Target.CLIENT, Target.RADIO_CLIENT)
 _ACKNOWLEDGED = (Target.MASTER, Target.CLIENT)
 
 _MOST_COMMANDS = 5
+_MOST_TO_COME_BACK = 20  # commands
+_PROGRAM_MODE = b'\x70'  # STS: the processor is in program mode (M 8-3); it changes again
 
 
 @case('A command has DST, SRC, CMD, STS 00 and TNS, and the check covers what the manual says.',
       'M 5-2 to 5-7, 6-3', *_ASKING)
 def command_form(end: AnsweringEnd) -> None:
-    command = end.next_command()
+    try:
+        command = end.next_command()
+    except Skipped:
+        if not end.wire.noise:
+            raise
+        raise Failed('a command', f'{end.wire.noise} bytes outside of any symbol') from None
     data = command.data
     if len(data) < codec.HEADER_SIZE or data[2] & codec.REPLY_BIT or data[3]:
         raise Failed('a command with STS 00', data.hex(' '))
@@ -79,24 +86,53 @@ def repetitions_limited(end: AnsweringEnd) -> None:
     expect_limit('the command again', comes)
 
 
-@case('A check byte of 10 is not doubled in a reply.', 'M 5-5', *_ASKING)
-def check_not_doubled(end: AnsweringEnd) -> None:
+def _read_of_a_word(end: AnsweringEnd) -> tuple[Symbol, bytes]:
+    """Return a command that reads words, and the reply to it without the last word."""
     for _ in range(_MOST_COMMANDS):
         command = end.next_command()
         reply = end.serve(command.data)
-        frames = [] if len(reply) < codec.HEADER_SIZE + 2 else [
-            codec.message(reply[:-2] + value.to_bytes(2, 'little'), end.wire.check)
-            for value in range(0x1000)]
-        frame = next((frame for frame in frames
-                      if codec.has_10_in_check(frame, end.wire.check)), None)
-        if frame is not None:
-            break
+        if len(reply) >= codec.HEADER_SIZE + 2:
+            return command, reply[:-2]
         end.finish(command)
-    else:
-        raise Skipped('not tried: no command reads a word')
+    raise Skipped('not tried: no command reads a word')
+
+
+def _expect_taken(end: AnsweringEnd, command: Symbol, raw: bytes) -> None:
+    """Send ``raw`` instead of the reply to a command, and expect that it is taken."""
     end.acknowledge(command)
-    end.say(frame)
+    end.say(raw)
     end.expect_taken(command)
+
+
+@case('A data byte 10 is doubled in a reply, and single in its value.', 'M 2-7, 5-4', *_ASKING)
+def stuffing(end: AnsweringEnd) -> None:
+    command, begun = _read_of_a_word(end)
+    _expect_taken(end, command, codec.message(begun + b'\x10\x10', end.wire.check))
+
+
+@case('A check byte of 10 is not doubled in a reply.', 'M 5-5', *_ASKING)
+def check_not_doubled(end: AnsweringEnd) -> None:
+    command, begun = _read_of_a_word(end)
+    frames = (codec.message(begun + value.to_bytes(2, 'little'), end.wire.check)
+              for value in range(0x10000))
+    _expect_taken(end, command, next(
+        frame for frame in frames if codec.has_10_in_check(frame, end.wire.check)))
+
+
+@case('A reply with an error has six bytes, and is the reply.', 'M 6-3, 8-2', *_ASKING)
+def error_taken(end: AnsweringEnd) -> None:
+    command = end.next_command()
+    header = end.serve(command.data)[:codec.HEADER_SIZE]
+    _expect_taken(end, command, codec.message(
+        header[:3] + _PROGRAM_MODE + header[4:], end.wire.check))
+
+
+@case('Bytes outside of a message do not spoil the reply after them.', 'M 3-4, 4-7 to 4-9',
+      *_ASKING)
+def noise_before_reply(end: AnsweringEnd) -> None:
+    command = end.next_command()
+    _expect_taken(end, command, b'\x55\x00\xFF\x03' + codec.message(
+        end.serve(command.data), end.wire.check))
 
 
 def _follows(end: AnsweringEnd, command: Symbol,
@@ -131,15 +167,17 @@ def expect_not_used(end: AnsweringEnd, *answers: Callable[[Symbol], None]) -> No
         raise failure
 
 
-# No reply with another CMD: it may end the command as an error, and we cannot see that.
 def _with_change(end: AnsweringEnd, at: int) -> Callable[[Symbol], None]:
     """Return an answer that gives the reply, with another byte in its header."""
     def answer(command: Symbol) -> None:
-        reply = bytearray(end.serve(command.data))
-        reply[at] ^= 0x05
-        end.acknowledge(command)
-        end.say(codec.message(bytes(reply), end.wire.check))
+        _say_changed(end, command, end.serve(command.data), at)
     return answer
+
+
+def _say_changed(end: AnsweringEnd, command: Symbol, reply: bytes, at: int) -> None:
+    end.acknowledge(command)
+    changed = reply[:at] + bytes((reply[at] ^ 0x05,)) + reply[at:][1:]
+    end.say(codec.message(changed, end.wire.check))
 
 
 @case('A reply with another TNS or DST is not that of the command.', 'M 6-3, 6-7', *_ACKNOWLEDGED)
@@ -147,11 +185,57 @@ def other_reply_ignored(end: AnsweringEnd) -> None:
     expect_not_used(end, *(_with_change(end, at) for at in (5, 4, 0)))
 
 
-@case('A reply with another CMD is not used as that of the command.', 'M 6-3', *_ACKNOWLEDGED)
+@case('A reply with another CMD is not used as that of the command.', 'M 6-3', *_ASKING)
 def other_code_not_used(end: AnsweringEnd) -> None:
     if _uses(end, [_with_change(end, 2)]) is None:
         return
-    # An answer of a target that ends the command as a fault would look the same.
+    # It went on at once. Only words that come back show whether it has used the reply.
     end.finish(end.next_command())
-    raise Skipped('not judged: the next command comes at once, so the target has used the reply '
-                  'or ended the command as failed: look whether it shows a value')
+    body = _read_that_comes_back(end)
+    if not body:
+        raise Skipped('not judged: the next command comes at once, be the reply used or refused; '
+                      'look whether the target shows a value, or let it write a word that it reads')
+    if _comes_back(end, body):
+        raise Failed('no word of a reply with another CMD', 'a command that writes this word')
+
+
+def _mark(number: int) -> bytes:
+    """Return a word that is in no other place of a command."""
+    return (2600 + number).to_bytes(2, 'little')
+
+
+def _read_that_comes_back(end: AnsweringEnd) -> bytes:
+    """Return what follows TNS in a read whose word a later command has; empty for none."""
+    bodies: list[bytes] = []
+    for _ in range(_MOST_TO_COME_BACK):
+        command = end.next_command()
+        body, reply = command.data[codec.HEADER_SIZE:], end.serve(command.data)
+        back = [read for number, read in enumerate(bodies) if _mark(number) in body]
+        if back:
+            end.finish(command)
+            return back[0]
+        if len(reply) < codec.HEADER_SIZE + 2:
+            end.finish(command)
+            continue
+        end.acknowledge(command)
+        end.say(codec.message(reply[:-2] + _mark(len(bodies)), end.wire.check))
+        bodies.append(body)
+    return b''
+
+
+def _comes_back(end: AnsweringEnd, body: bytes) -> bool:
+    """Give a word to such a read in a reply with another CMD; tell whether it comes back."""
+    mark, is_given = _mark(_MOST_TO_COME_BACK), False
+    for _ in range(2 * _MOST_TO_COME_BACK):
+        command = end.next_command()
+        if mark in command.data[codec.HEADER_SIZE:]:
+            end.finish(command)
+            return True
+        if is_given or command.data[codec.HEADER_SIZE:] != body:
+            end.finish(command)
+            continue
+        _say_changed(end, command, end.serve(command.data)[:-2] + mark, 2)
+        is_given = True
+    if not is_given:
+        raise Skipped('not judged: the read whose word came back does not come again')
+    return False

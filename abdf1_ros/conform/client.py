@@ -16,6 +16,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from abdf1_ros.conform import codec
 from abdf1_ros.conform.asking import expect_not_used
 from abdf1_ros.conform.case import case, Target
@@ -98,6 +100,39 @@ def _refuse(end: ServerEnd, *then: bytes) -> None:
         end.wire.send(raw)
         end.expect(SymbolKind.NAK)
     end.reply_and_hear(command, 'DLE ACK for the good reply')
+
+
+def _expect_refused(end: ServerEnd, broken: Callable[[bytes], bytes]) -> None:
+    """Send ``broken`` of a reply, which is answered with DLE NAK; then send the good reply."""
+    command = end.next_command()
+    end.wire.send(codec.ACK)
+    end.wire.send(broken(end.serve(command.data)))
+    end.expect(SymbolKind.NAK)
+    end.reply_and_hear(command, 'DLE ACK for the good reply')
+
+
+@case('A reply of fewer than six bytes is answered with DLE NAK.', 'M 4-4, 4-7 to 4-9', _CLIENT)
+def short_reply_refused(end: ServerEnd) -> None:
+    _expect_refused(end, lambda reply: codec.message(
+        reply[:codec.HEADER_SIZE - 1], end.wire.check))
+
+
+@case('DLE ENQ inside a reply ends it; the answer is DLE NAK.', 'M 4-7 to 4-9', _CLIENT)
+def broken_reply_refused(end: ServerEnd) -> None:
+    _expect_refused(end, lambda reply: codec.divided(
+        codec.message(reply, end.wire.check))[0] + codec.ENQ)
+
+
+@case('DLE ACK and DLE NAK that answer nothing, and DLE EOT, are ignored.', 'M 4-5, 4-7 to 4-9',
+      _CLIENT)
+def stray_symbols_ignored(end: ServerEnd) -> None:
+    command = end.next_command()
+    for raw in (codec.EOT, codec.ACK, codec.NAK, codec.ACK, codec.EOT):
+        end.wire.send(raw)
+    symbol = end.hear()
+    if symbol is not None:
+        raise Failed('silence: the message has been acknowledged', str(symbol))
+    end.reply_and_hear(command)
 
 
 @case('A reply that was answered with DLE NAK is not used.', 'M 4-7 to 4-9', _CLIENT)

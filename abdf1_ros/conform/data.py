@@ -36,6 +36,7 @@ _ECHO = 0x06
 _TYPED = 0x0F
 _ILLEGAL = 0x10  # STS: command code, sub-code, length or format not accepted (M 8-2)
 _EXTENDED = 0xF0  # STS: an EXT STS follows (M 8-3)
+_BEYOND = 9999  # an element that no integer file has
 _INTEGER, _ARRAY = 4, 9  # types of a PLC-5's data (M 7-29)
 
 # Sizes (bytes) of an echo that every product accepts. SLC 5/01 and 5/02 accept up to 95 bytes, a
@@ -119,12 +120,19 @@ def tns_returned(end: AskingEnd) -> None:
 
 @case('A command code that is not known gets STS 10.', 'M 8-2', *_ANSWERING)
 def unknown_command(end: AskingEnd) -> None:
-    _refused(end.ask(0x0C, b''), (_ILLEGAL,))
+    for body in _empty_and_read(end):
+        _refused(end.ask(0x0C, body), (_ILLEGAL,))
 
 
 @case('A function code that is not known gets STS 10.', 'M 8-2', *_ANSWERING)
 def unknown_function(end: AskingEnd) -> None:
-    _refused(end.ask(_TYPED, b'\xE7'), (_ILLEGAL, _EXTENDED))
+    for body in _empty_and_read(end):
+        _refused(end.ask(_TYPED, b'\xE7' + body[1:]), (_ILLEGAL, _EXTENDED))
+
+
+def _empty_and_read(end: AskingEnd) -> list[bytes]:
+    """Return an empty body, and the body of a read if the family is known."""
+    return [b'', *([_read_body(end.words, 1)] if end.words.family else [])]
 
 
 @case('Diagnostic status tells what the processor is.', 'M 7-3', *_ANSWERING)
@@ -325,8 +333,24 @@ def address_forms_agree(end: AskingEnd) -> None:
 def element_too_high(end: AskingEnd) -> None:
     words = _words_of(end)
     _read(end, 1)  # so that the element is the reason, not the command
-    beyond = Words(words.file, 9999, family=words.family)
+    beyond = Words(words.file, _BEYOND, family=words.family)
     _refused(end.ask(_TYPED, _read_body(beyond, 1)), (_ILLEGAL, 0x50, _EXTENDED))
+
+
+@case('A read that goes beyond the last element of a file is refused as a whole.',
+      'M 8-2 to 8-4', *_ANSWERING)
+def end_of_file(end: AskingEnd) -> None:
+    def read_at(element: int, count: int) -> bytes:
+        return end.ask(_TYPED, _read_body(replace(words, element=element), count))
+
+    words = _words_of(end)
+    _read(end, 1)
+    last, beyond = words.element, _BEYOND
+    while beyond - last > 1:
+        middle = (last + beyond) // 2
+        last, beyond = (last, middle) if read_at(middle, 1)[3] else (middle, beyond)
+    _read(end, 1, replace(words, element=last))
+    _refused(read_at(last, 2), (_ILLEGAL, 0x50, _EXTENDED))
 
 
 @case('What was written is what is read, bit by bit.',

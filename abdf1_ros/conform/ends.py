@@ -387,6 +387,7 @@ class AnsweringEnd(ABC):
         self._serve = serve
         self._further: deque[Symbol] = deque()
         self._in_hand = bytes(codec.HEADER_SIZE)
+        self._why_none: Skipped | None = None  # why no command has come before a case
 
     def serve(self, command: bytes) -> bytes:
         """Execute a command, and return its reply; raise Failed if it has no whole header."""
@@ -396,11 +397,14 @@ class AnsweringEnd(ABC):
 
     def settle(self) -> None:
         """Answer one command, so that the target does not count us as inactive in the case."""
+        self._why_none = None
         for _ in range(MOST_TRIES):
             try:
                 self.finish(self.next_command())
             except Failed:  # the case will show it; the target may still be busy
                 continue
+            except Skipped as reason:  # the case will tell it, without another wait
+                self._why_none = reason
             return
 
     def check_target(self) -> None:  # noqa: B027
@@ -412,6 +416,8 @@ class AnsweringEnd(ABC):
 
     def hear_command(self, is_wanted: Callable[[Symbol], bool], what: str) -> Symbol:
         """Return the first command that ``is_wanted``; raises as ``next_command``."""
+        if self._why_none is not None:
+            raise self._why_none
         try:
             symbol = self.wire.until(is_wanted, what, PATIENCE)
         except Failed:

@@ -47,9 +47,12 @@ def polled_after_ack(end: SlaveEnd) -> None:
     end.finish(command)
 
 
-def _polled_again(end: SlaveEnd, answer: Callable[[Symbol], bytes], what: str) -> Symbol:
+def _polled_again(end: SlaveEnd, answer: Callable[[Symbol], bytes], what: str,
+                  passed: tuple[SymbolKind, ...] = ()) -> Symbol:
     """
     Give ``answer`` to the poll for a reply, and expect another poll; return the command.
+
+    A symbol of a kind that is ``passed`` may come before.
 
     A master with more than one command under way may send one first. Then the next is tried.
     """
@@ -59,6 +62,8 @@ def _polled_again(end: SlaveEnd, answer: Callable[[Symbol], bytes], what: str) -
         end.next_poll()
         end.wire.send(answer(command))
         symbol = end.wire.hear(PATIENCE)
+        if symbol is not None and symbol.kind in passed:
+            symbol = end.wire.hear(PATIENCE)
         if symbol is not None and symbol.station not in (None, end.station):
             symbol = end.next_visit(what)
         if symbol is not None and symbol.kind is SymbolKind.POLL and symbol.is_good:
@@ -74,6 +79,37 @@ def _polled_again(end: SlaveEnd, answer: Callable[[Symbol], bytes], what: str) -
 def eot_polled_again(end: SlaveEnd) -> None:
     command = _polled_again(end, lambda command: codec.EOT, 'another poll after DLE EOT')
     end.reply_and_hear(command)
+
+
+@case('A poll that is not answered does not end the work of the master.', 'M 3-13 to 3-15',
+      _MASTER)
+def silent_poll_survived(end: SlaveEnd) -> None:
+    command = end.next_command()
+    end.wire.send(codec.ACK)
+    end.next_poll()
+    visit = end.next_visit('another poll, or a command')
+    if visit.kind is SymbolKind.POLL:
+        end.reply_and_hear(command)
+
+
+@case('A reply that breaks off is asked for by another poll.', 'M 3-13 to 3-15', _MASTER)
+def cut_reply_polled_again(end: SlaveEnd) -> None:
+    def cut(command: Symbol) -> bytes:
+        frame = codec.message(end.serve(command.data), end.wire.check)
+        return frame[:len(frame) // 2]
+
+    command = _polled_again(end, cut, 'another poll')
+    end.reply_and_hear(command, 'DLE ACK for the good reply')
+
+
+@case('A message of fewer than six bytes is not the reply: the master polls again.',
+      'M 3-13 to 3-15, 4-4', _MASTER)
+def short_reply_not_used(end: SlaveEnd) -> None:
+    def short(command: Symbol) -> bytes:
+        return codec.message(end.serve(command.data)[:codec.HEADER_SIZE - 1], end.wire.check)
+
+    command = _polled_again(end, short, 'another poll', passed=(SymbolKind.ACK,))
+    end.reply_and_hear(command, 'DLE ACK for the good reply')
 
 
 @case('A reply with a wrong check is asked for by another poll; DLE NAK would reset the whole '

@@ -31,6 +31,7 @@ from abdf1_ros.conform.ends import (
 from abdf1_ros.conform.wire import expect_same, Failed
 
 _PEER = Target.PEER
+_MOMENT = 0.3  # s
 
 
 def _answer(end: PeerEnd, frame: bytes, kind: SymbolKind) -> None:
@@ -59,6 +60,7 @@ def broken_message_refused(end: PeerEnd) -> None:
     end.ask(0x06, b'\x00')  # so that the last response is DLE ACK
     begun, rest = codec.divided(end.frame(end.command()))
     _answer(end, begun + codec.ENQ, SymbolKind.NAK)
+    end.wire.expect_silence('the message has its response', _MOMENT)
     end.wire.send(rest)
     symbol = end.wire.hear()
     if symbol is not None and symbol.kind is not SymbolKind.NAK:
@@ -83,6 +85,16 @@ def enquiry_after_noise(end: PeerEnd) -> None:
     end.ask(0x06, b'\x00')
     end.wire.send(b'\x55\x00')
     _answer(end, codec.ENQ, SymbolKind.NAK)
+
+
+@case('DLE ACK and DLE NAK that answer nothing, and DLE EOT, are ignored.', 'M 4-5, 4-7 to 4-9',
+      _PEER)
+def stray_symbols_ignored(end: PeerEnd) -> None:
+    end.ask(0x06, b'\x00')
+    for raw in (codec.ACK, codec.NAK, codec.EOT):
+        end.wire.send(raw)
+        end.wire.expect_silence('all messages have their responses')
+    end.ask(0x06, b'\x00')
 
 
 @case('A message answered with DLE NAK is sent again.', 'M 4-5', _PEER)

@@ -160,6 +160,16 @@ def bad_reply_ignored(end: RadioServerEnd) -> None:
     _not_taken(end, command, codec.damaged(reply))
 
 
+@case('A reply that breaks off, or has fewer than six bytes, is dropped in silence.', _RULES,
+      _SENDER)
+def cut_reply_ignored(end: RadioServerEnd) -> None:
+    command = end.next_command()
+    reply = end.serve(command.data)
+    whole = codec.message(reply, end.wire.check)
+    _not_taken(end, command, whole[:len(whole) // 2], codec.message(
+        reply[:codec.HEADER_SIZE - 1], end.wire.check))
+
+
 @case('A reply to another node, or to another command, is not taken.', _RULES, _SENDER)
 def other_reply_ignored(end: RadioServerEnd) -> None:
     command = end.next_command()

@@ -48,6 +48,8 @@ Habit = Enum('Habit', [
     'BAD_CHECK_OF_HIGH_BYTES', 'CUTS_ECHO', 'CUTS_ECHO_AT_80', 'SMALL_PACKETS', 'EXCHANGES_TNS',
     'DOES_ALL_COMMANDS', 'DOES_ALL_FUNCTIONS', 'NO_IDENTITY', 'READS_SHORT', 'READS_LONG',
     'READS_ZEROS_BEYOND', 'WRITES_NOTHING', 'MASKS_NOTHING', 'REFUSES_AREA', 'TEXT_IS_N7_0',
+    'LOSES_DOUBLED_BYTE',  # 10, of what it takes
+    'SENDS_NO_STX', 'READS_BEYOND_LAST', 'TAKES_CMD_0C', 'TAKES_FNC_E7',  # as a read
     'SLOW',  # each response and reply 300 ms late
     'LATE_REPLY',  # 300 ms after the command
     'VERY_LATE_REPLY',  # 3 s
@@ -92,6 +94,8 @@ Habit = Enum('Habit', [
     'ACK_TIMEOUT_OF_8',  # s
     'REPEATS_AFTER_ACK',  # once, after 2 s
     'USES_REFUSED_REPLY',
+    'REFUSES_SIX_BYTES',  # as it does fewer
+    'NAKS_BROKEN_TWICE', 'REPEATS_AT_ANY_NAK', 'REPEATS_AT_EOT',
     # Of a master or client.
     'SAME_TNS', 'NEW_TNS_FOR_REPETITION', 'STS_IN_COMMAND', 'POLL_WITH_CRC', 'DOES_NOT_POLL',
     'EOT_ENDS_COMMAND', 'NAKS_BAD_REPLY', 'IMPATIENT', 'POLLS_BETWEEN_REPETITIONS', 'POLLS_OTHERS',
@@ -100,6 +104,9 @@ Habit = Enum('Habit', [
     'NAK_BEFORE_COMMAND', 'TAKES_ANY_TNS', 'TAKES_ANY_DESTINATION', 'TAKES_ANY_CODE',
     'REPEATS_FOR_EVER', 'SENDS_NO_FUNCTION',
     'STOPS_AFTER_10',  # commands
+    'TAKES_SHORT_REPLY', 'WAITS_FOR_EVER',  # for the answer to a poll
+    'ENDS_AT_OTHER_CODE',  # the command as failed
+    'WRITES_BACK',  # each word that it reads
     # Of a radio modem node or client.
     'ACKNOWLEDGES', 'ANSWERS_SYMBOLS', 'REPEATS_AFTER_NAK', 'REPLIES_FOR_OTHERS',
     'EXECUTES_FOR_OTHERS',  # in silence
@@ -200,7 +207,8 @@ class Wire:
         body = data if self.has(Habit.UNSTUFFED) else data.replace(b'\x10', b'\x10\x10')
         body, self._embedded = self._embedded + body, b''
         head = b'' if station is None else bytes((_DLE, _SOH)) + self.number(station)
-        return head + bytes((_DLE, _STX)) + body + bytes((_DLE, _ETX)) + check
+        begin = b'' if self.has(Habit.SENDS_NO_STX) else bytes((_DLE, _STX))
+        return head + begin + body + bytes((_DLE, _ETX)) + check
 
     def number(self, station: int) -> bytes:
         """Return a station as data symbol."""
@@ -248,7 +256,7 @@ class Wire:
                 continue
             code = yield
             if code == _DLE:
-                data.append(_DLE)
+                data += bytes(() if self.has(Habit.LOSES_DOUBLED_BYTE) else (_DLE,))
             elif code == _ETX:
                 break
             elif code in (_ACK, _NAK) and self.has(Habit.RESPONSE_IS_DATA):
@@ -339,10 +347,11 @@ class _Executor:
         cmd, fnc = data[2], data[6:7]
         if fnc in (b'\xAA', b'\x67') and has(Habit.WRITES_NOTHING):
             return self._done(data)
-        data = self._misread(data)
+        data = self._misread(self._taken_for_a_read(data))
         if cmd == 0x0F and fnc == b'\x68' and data[11:12] == b'\x07' and has(Habit.REFUSES_AREA):
             return self._done(data, sts=0x10)
         reply = self._plc.serve(data)
+        reply = reply[:2] + bytes((cmd | 0x40,)) + reply[3:]
         if fnc == b'\xAB' and has(Habit.MASK_CHANGES_NEXT_WORD):
             element = bytes((data[10] + 1,))
             self._plc.serve(
@@ -361,10 +370,7 @@ class _Executor:
             reply = reply[:86] if has(Habit.CUTS_ECHO_AT_80) else reply
         if cmd == 0x06 and fnc == b'\x03' and has(Habit.NO_IDENTITY):
             reply = reply[:6]
-        is_lenient = (cmd == 0x0C and has(Habit.DOES_ALL_COMMANDS)
-                      or fnc == b'\xE7' and has(Habit.DOES_ALL_FUNCTIONS)
-                      or fnc == b'\xA2' and has(Habit.READS_ZEROS_BEYOND))
-        if reply[3] and is_lenient:
+        if reply[3] and self._is_lenient(cmd, fnc):
             reply = self._done(data) + bytes(2)
         if fnc in (b'\xA2', b'\x68'):
             reply = reply[:-1] if has(Habit.READS_SHORT) else reply
@@ -399,6 +405,22 @@ class _Executor:
         if has(Habit.WRITES_FIRST_WORD_ONLY):
             head, words = head[:7] + b'\x02' + head[8:], words[:2]
         return head + words
+
+    def _taken_for_a_read(self, data: bytes) -> bytes:
+        has, fnc = self._wire.has, data[6:7]
+        if data[2] == 0x0C and has(Habit.TAKES_CMD_0C) and len(data) > 7:
+            return data[:2] + b'\x0F' + data[3:]
+        if fnc == b'\xE7' and has(Habit.TAKES_FNC_E7) and len(data) > 7:
+            return data[:6] + b'\xA2' + data[7:]
+        if fnc == b'\xA2' and data[8:12] == b'\x07\x89\x13\x00' and has(Habit.READS_BEYOND_LAST):
+            return data[:7] + b'\x02' + data[8:]
+        return data
+
+    def _is_lenient(self, cmd: int, fnc: bytes) -> bool:
+        has = self._wire.has
+        return (cmd == 0x0C and has(Habit.DOES_ALL_COMMANDS)
+                or fnc == b'\xE7' and has(Habit.DOES_ALL_FUNCTIONS)
+                or fnc == b'\xA2' and has(Habit.READS_ZEROS_BEYOND))
 
     @staticmethod
     def _done(data: bytes, sts: int = 0) -> bytes:
@@ -523,6 +545,7 @@ class _FullDuplex(Wire):
         super().__init__(check, habits, is_half_duplex=False)
         self._last_response = _NAK
         self._outgoing: deque[bytes] = deque()
+        self._sent = b''
         self._naks = self._enquiries = 0
         self._ack_timeout = 8.0 if self.has(Habit.ACK_TIMEOUT_OF_8) else _ACK_TIMEOUT
         self._sending = 0  # counts messages and repetitions, so that an old timer is known
@@ -555,6 +578,8 @@ class _FullDuplex(Wire):
         kind = symbol[0]
         if kind == 'broken' or kind == _ETX and self.has(Habit.NAKS_STRAY_ETX):
             self._respond(_NAK)
+            if self.has(Habit.NAKS_BROKEN_TWICE):
+                self._respond(_NAK)
         elif kind == 'message':
             assert isinstance(symbol[2], bytes)
             self._received(symbol[2], bool(symbol[3]))
@@ -565,6 +590,9 @@ class _FullDuplex(Wire):
                 self.say(bytes((_DLE, code)))
         elif kind == _ACK and self._outgoing:
             self._end()
+        elif kind == _NAK and self.has(Habit.REPEATS_AT_ANY_NAK) and not self._outgoing or \
+                kind == _EOT and self.has(Habit.REPEATS_AT_EOT):
+            self.say(self.frame(self._sent))
         elif kind == _NAK and self._outgoing:
             self._naks += 1
             if self._naks > _LIMIT and not self.has(Habit.NEVER_GIVES_UP) or \
@@ -580,13 +608,15 @@ class _FullDuplex(Wire):
             if not self.has(Habit.IGNORES_BAD_CHECK):
                 self._respond(_NAK)
             return self.refused(data)
-        if self.is_full or len(data) < 6 and not self.has(Habit.TAKES_SHORT) or \
+        shortest = 7 if self.has(Habit.REFUSES_SIX_BYTES) else \
+            1 if self.habits & {Habit.TAKES_SHORT, Habit.TAKES_SHORT_REPLY} else 6
+        if self.is_full or len(data) < shortest or \
                 len(data) > 110 and self.has(Habit.SMALL_PACKETS):
             return self._respond(_NAK)
         is_duplicate = self.is_duplicate(data)
         if not (is_duplicate and self.has(Habit.DUPLICATE_WITHOUT_ACK)):
             self._respond(_ACK, is_followed=not is_duplicate)
-        if not is_duplicate and len(data) >= 6:
+        if not is_duplicate and len(data) >= (1 if self.has(Habit.TAKES_SHORT_REPLY) else 6):
             self.execute(data)
 
     def _respond(self, code: int, is_followed: bool = False) -> None:
@@ -609,7 +639,8 @@ class _FullDuplex(Wire):
         self._transmit()
 
     def _transmit(self) -> None:
-        self.say(self.frame(self._outgoing[0]))
+        self._sent = self._outgoing[0]
+        self.say(self.frame(self._sent))
         self._wait()
         if self.has(Habit.ENQUIRES_ALWAYS):
             self.say(bytes((_DLE, _ENQ)), 0.6)
@@ -680,6 +711,7 @@ class MutatedPeer(_FullDuplex):
 
 
 _PLC5_READ = bytes.fromhex('68 00 00 02 00 06 07 00 02 00')
+_PLC5_WRITE = bytes.fromhex('67 00 00 01 00 06 07 01 99 09 03 42')  # and a word
 
 
 class _Asker:
@@ -688,6 +720,7 @@ class _Asker:
     def __init__(self, wire: Wire) -> None:
         self._wire = wire
         self._tns = 0x1234
+        self._word = b''
 
     def next_command(self) -> bytes:
         """Return the link data of the next command."""
@@ -695,7 +728,8 @@ class _Asker:
         if self._wire.has(Habit.STOPS_AFTER_10) and self._tns > 0x123E:
             return b''
         sts = 2 if self._wire.has(Habit.STS_IN_COMMAND) else 0
-        command = self.with_tns(bytes((1, 5, 0x0F, sts, 0, 0)) + _PLC5_READ)
+        body, self._word = _PLC5_WRITE + self._word if self._word else _PLC5_READ, b''
+        command = self.with_tns(bytes((1, 5, 0x0F, sts, 0, 0)) + body)
         if self._wire.has(Habit.SENDS_NO_FUNCTION):
             return command[:6] + command[7:]
         return command[:5] if self._wire.has(Habit.TAKES_SHORT) else command
@@ -707,10 +741,15 @@ class _Asker:
     def is_reply(self, data: bytes, command: bytes) -> bool:
         """Tell whether a message is taken for the reply to a command (M 6-3, 6-7)."""
         has = self._wire.has
-        return (data[0] == command[1] or has(Habit.TAKES_ANY_DESTINATION)) and (
+        if len(data) < 6:
+            return has(Habit.TAKES_SHORT_REPLY)
+        is_code = data[2] == command[2] | 0x40 or has(Habit.TAKES_ANY_CODE)
+        is_reply = (data[0] == command[1] or has(Habit.TAKES_ANY_DESTINATION)) and (
             data[4:6] == command[4:6] or has(Habit.TAKES_ANY_TNS)) and (
-            data[2] == command[2] | 0x40 or has(Habit.TAKES_ANY_CODE)) or has(
-                Habit.TAKES_ANY_REPLY)
+            is_code or has(Habit.ENDS_AT_OTHER_CODE)) or has(Habit.TAKES_ANY_REPLY)
+        if is_reply and is_code and has(Habit.WRITES_BACK):
+            self._word = data[6:][-2:]
+        return is_reply
 
     def renewed(self, command: bytes) -> bytes:
         """Return a command as it is repeated."""
@@ -791,7 +830,8 @@ class _Radio(Wire):
         if is_good and self.has(Habit.ACKNOWLEDGES):
             self.say(bytes((_DLE, _ACK)))
         if not (is_good or self.has(Habit.TAKES_BAD_CHECK)) or \
-                len(data) < (5 if self.has(Habit.TAKES_SHORT) else 6):
+                len(data) < (5 if self.habits & {Habit.TAKES_SHORT, Habit.TAKES_SHORT_REPLY} else
+                             7 if self.has(Habit.REFUSES_SIX_BYTES) else 6):
             return self.refused(data)
         dst, src = data[:2]
         if src == self.own_number:
@@ -898,8 +938,11 @@ class MutatedMaster(Wire):
         self.then(0.1, self._go_on)
 
     def take(self, symbol: Symbol) -> None:
-        """Hand a symbol to the transaction."""
-        self._go_on(symbol)
+        """Hand a symbol to the transaction; what breaks off is nothing, and six bytes may be."""
+        is_short = self.has(Habit.REFUSES_SIX_BYTES) and symbol[0] == 'message' and \
+            isinstance(symbol[2], bytes) and len(symbol[2]) < 7
+        if symbol != ('broken',) and not is_short:
+            self._go_on(symbol)
 
     def _go_on(self, symbol: Symbol | None = None) -> None:
         """Let the transaction take a symbol (None: silence), and wait for the next."""
@@ -955,6 +998,8 @@ class MutatedMaster(Wire):
         while self.now < end and silent <= (1 if self.has(Habit.ONE_REPETITION) else _LIMIT):
             self._poll()
             symbol = yield 0.02 if self.has(Habit.IMPATIENT) else _ACK_TIMEOUT
+            if symbol is None and self.has(Habit.WAITS_FOR_EVER):
+                yield 1e6
             if symbol == (_EOT,):
                 if self.has(Habit.EOT_ENDS_COMMAND):
                     return
