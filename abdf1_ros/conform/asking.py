@@ -194,7 +194,7 @@ def other_code_not_used(end: AnsweringEnd) -> None:
     body = _read_that_comes_back(end)
     if not body:
         raise Skipped('not judged: the next command comes at once, be the reply used or refused; '
-                      'look whether the target shows a value, or let it write a word that it reads')
+                      'look whether the target shows a value, or let it write what it reads')
     if _comes_back(end, body):
         raise Failed('no word of a reply with another CMD', 'a command that writes this word')
 

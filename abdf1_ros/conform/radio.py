@@ -35,6 +35,7 @@ _SENDING_ON = 'ML11 517 to 522'
 _BROADCAST = 0xFF
 _ACK_TIMEOUT = 6.0  # s; the slowest full-duplex node sends DLE ENQ within this time
 _MOMENT = 0.3  # s; a node that accepts a frame that it should drop sends within this time
+_CUT = 6  # bytes of a frame
 _COUNTERS = b'\x01\x00\x00\x1A'  # FNC, address and size of a read of diagnostic counters
 
 
@@ -163,11 +164,15 @@ def bad_reply_ignored(end: RadioServerEnd) -> None:
 @case('A reply that breaks off, or has fewer than six bytes, is dropped in silence.', _RULES,
       _SENDER)
 def cut_reply_ignored(end: RadioServerEnd) -> None:
-    command = end.next_command()
-    reply = end.serve(command.data)
-    whole = codec.message(reply, end.wire.check)
-    _not_taken(end, command, whole[:len(whole) // 2], codec.message(
-        reply[:codec.HEADER_SIZE - 1], end.wire.check))
+    def broken(reply: bytes) -> bytes:
+        return codec.message(reply, end.wire.check)[:_CUT]
+
+    def short(reply: bytes) -> bytes:
+        return codec.message(reply[:codec.HEADER_SIZE - 1], end.wire.check)
+
+    for cut in (broken, short):
+        command = end.next_command()
+        _not_taken(end, command, cut(end.serve(command.data)))
 
 
 @case('A reply to another node, or to another command, is not taken.', _RULES, _SENDER)

@@ -18,7 +18,8 @@ Judge ``conform``: mutate its targets, and print which mutations it catches.
 Each seed draws 20 mutations over the six kinds of end (``mutations.py``) and lets the cases of
 ``conform`` judge each of them. A mutation is
 
-- caught, if a case fails that passes without it;
+- caught, if a case fails that passes without it, or no case can be tried any more (both end
+  ``conform`` with status 1);
 - open, if a case that passes without it is skipped: the user reads why;
 - without effect, if the end says the same, byte for byte and at the same times, to all cases and
   to --steps random pieces (``traffic.py``);
@@ -124,6 +125,8 @@ def judge(setting: Setting, mutation: Mutation, steps: int) -> Judgement:
 def _told(before: dict[str, CaseResult], after: dict[str, CaseResult]
           ) -> tuple[Outcome | None, str]:
     """Return what the cases have told that they do not tell without the mutation."""
+    if {result.verdict for result in after.values()} == {Verdict.SKIP}:
+        return Outcome.CAUGHT, f'no rule was tried: {next(iter(after.values())).got}'
     news = [result for name, result in after.items()
             if result.verdict is not before[name].verdict]
     for verdict, outcome in ((Verdict.FAIL, Outcome.CAUGHT), (Verdict.SKIP, Outcome.OPEN)):
