@@ -15,8 +15,7 @@
 """
 The demo: simulated PLCs, the node as a process, and the view of a robot cell, step by step.
 
-The demo needs no hardware. Everything stays on this machine: discovery is limited to localhost.
-Without ROS_DOMAIN_ID the demo uses its own domain.
+Everything stays on this machine: discovery is limited to localhost.
 """
 
 from __future__ import annotations
@@ -40,13 +39,12 @@ import time
 from abdf1_ros.cli.simulator import Cast, parse_options
 from abdf1_ros.cli.terminal import (
     called,
-    command_parser,
     drop_output,
     ignore_further,
-    number_option,
     prepare_output,
     run_command,
 )
+from abdf1_ros.cli.usage import parser_of
 from abdf1_ros.driver.write import show
 from abdf1_ros.paths import config_file
 from abdf1_ros.pccc.values import Values
@@ -80,14 +78,6 @@ threading.Thread(target=end_with_the_demo, daemon=True).start()
 sys.exit(node())
 """
 
-_EPILOG = """\
-exit status: 0 when all was seen as it should be, or after Ctrl-C; 1 otherwise
-
-examples:
-  demo
-  demo --seconds 0
-  demo --peer
-"""
 _PATIENCE = 30.0
 _BRIDGE = 'abdf1: '
 _RESETS = 5  # attempts: on a busy machine the heartbeat may stop for a moment
@@ -550,14 +540,8 @@ class Demo(Stage):
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the demo; return 0, or 1 if a step failed."""
-    parser = command_parser('demo', __doc__, _EPILOG)
-    parser.add_argument('--seconds', default=30.0,
-                        type=number_option('a number of seconds from 0', 0),
-                        help='how long to run; 0 stays until Ctrl-C (default: %(default)g)')
-    parser.add_argument('--peer', action='store_true',
-                        help='show a full-duplex line, on which the PLC writes by itself')
     prepare_output()
-    options = parser.parse_args(args)
+    options = parser_of('demo').parse_args(args)
     return run_command('demo', partial(_run, options))
 
 

@@ -67,7 +67,7 @@ def run(name: str) -> int:
     except ModuleNotFoundError as error:  # also a module that a command imports later
         if error.name is None or error.name.startswith('abdf1_ros'):
             raise
-        from abdf1_ros.ros.process.usage import show_help
+        from abdf1_ros.cli.usage import show_help
         show_help(name, sys.argv[1:])
         print(f'{os.path.basename(sys.argv[0])}: the Python module {error.name} is missing; '
               f'{_cure(error.name)}', file=sys.stderr)

@@ -180,12 +180,12 @@ def test_module_that_is_missing_is_named(
     assert errors == f'-c: the Python module {module} is missing; {cure}\n'
 
 
-@pytest.mark.parametrize('name', ['node', 'lines'])
-def test_help_of_the_bridge_needs_no_ros(name: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize('name', ['node', 'lines', 'monitor', 'demo'])
+def test_help_of_a_program_with_ros_needs_no_ros(name: str, tmp_path: Path) -> None:
     program = ('import sys; sys.modules["rclpy"] = None\n'
                'from abdf1_ros.__main__ import main; sys.exit(main())')
     for more, status, said, fault in (
-            (['--help'], 0, f'usage: {name} --ros-args', ''),
+            (['--help'], 0, f'usage: {name} ', ''),
             ([], 2, '', f'{name}: the Python module rclpy')):
         done = subprocess.run([sys.executable, '-c', program, name, *more], check=False,
                               capture_output=True, text=True, timeout=PATIENCE)

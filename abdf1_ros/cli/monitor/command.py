@@ -12,21 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""
-Show the state of a running bridge, or of all bridges, from their topics alone.
-
-First comes the verdict. Then follows each topic with its age, its part of the line's time, a curve
-of the last seconds, and its value. Then follow faults, writes, link, stations and counters. On a
-terminal the picture is renewed in place; arrows, pages and the keys of its last line move it.
-Without a terminal, or with --once, plain text is printed.
-
-With --all there is a line for each bridge, the worst first; Return shows the marked bridge, q goes
-back.
-
-A value is fresh, or STALE if it is older than its topic promises. Topics that are published on
-change, or when a PLC writes to us, promise nothing: their value may have any age. A blank in a
-curve is a time without a fresh value.
-"""
+"""The program ``monitor``: it shows a running bridge, or all bridges, from their topics alone."""
 
 from __future__ import annotations
 
@@ -50,14 +36,13 @@ from abdf1_ros.cli.monitor.plant import PlantWatch, render_plant
 from abdf1_ros.cli.monitor.view import render, Style, TextLine
 from abdf1_ros.cli.terminal import (
     colour,
-    command_parser,
     EXIT_FAILED,
     EXIT_USAGE,
     has_reader_left,
     prepare_output,
-    seconds_option,
     tell,
 )
+from abdf1_ros.cli.usage import parser_of
 from abdf1_ros.errors import FormatError
 from abdf1_ros.ros.observer import graph_hint
 from abdf1_ros.signals import limit_output
@@ -86,18 +71,6 @@ _KEYS = 'q:end v:values r:reasons w:writes l:link s:stations c:counters'
 
 # Colours by ANSI codes; curses has the same numbers.
 _COLOURS = {Style.GOOD: 2, Style.WARNING: 3, Style.BAD: 1}
-
-_EPILOG = """\
-exit status: 0 at the end, 1 if the node is not found within --wait, 2 for bad options
-
-examples:
-  monitor
-  monitor --node /cell/line_1
-  monitor --all
-  monitor --all --once | grep -v ' OK '
-  monitor --once | grep -E 'STALE|no value'
-  monitor --seconds 60 --period 10 > state.txt
-"""
 
 
 class _Ending:
@@ -227,7 +200,7 @@ def main(args: Sequence[str] | None = None) -> int:
     words = list(sys.argv if args is None else ['monitor', *args])
     prepare_output()
     try:
-        return _run(_parse(remove_ros_args(words)[1:]), words)
+        return _run(parser_of('monitor').parse_args(remove_ros_args(words)[1:]), words)
     except (FormatError, RuntimeError, ValueError) as error:  # also rclpy's, for --ros-args
         _say(' '.join(str(error).split()))
         return EXIT_USAGE
@@ -280,22 +253,6 @@ def _draw_all(window: curses.window, plant: PlantWatch, has_ended: _Ending, mark
         screen.show_list(render_plant(plant.lines(), time.monotonic(), screen.width))
         plant.wait(has_ended, _RENEWAL)
     return screen.chosen
-
-
-def _parse(args: Sequence[str]) -> argparse.Namespace:
-    parser = command_parser('monitor', __doc__, _EPILOG)
-    parser.add_argument('--node', default='/abdf1',
-                        help='name of the bridge with its namespace (default: %(default)s)')
-    parser.add_argument('--all', action='store_true', help='show all bridges, each on one line')
-    parser.add_argument('--once', action='store_true', help='print one picture and end')
-    parser.add_argument('--seconds', type=seconds_option, default=math.inf,
-                        help='end this number of seconds after the node is found; with '
-                             '--all after the start')
-    parser.add_argument('--period', type=seconds_option, default=1.0,
-                        help='seconds between two printed pictures (default: %(default)g)')
-    parser.add_argument('--wait', type=seconds_option, default=10.0,
-                        help='seconds to look for the node at the start (default: %(default)g)')
-    return parser.parse_args(args)
 
 
 def _find(watch: NodeWatch, seconds: float, has_ended: _Ending) -> bool:

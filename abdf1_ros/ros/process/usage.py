@@ -64,9 +64,3 @@ def parser_of(name: str) -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--version', action=ShowVersion)
     return parser
-
-
-def show_help(name: str, words: list[str]) -> None:
-    """End the process with the help or the version of a command, if ``words`` ask for it."""
-    if name in _TEXTS and {*words} & {'-h', '--help', '--version'}:
-        parser_of(name).parse_known_args(words)
