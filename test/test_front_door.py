@@ -68,7 +68,7 @@ def test_names_of_the_package() -> None:
 
 
 @for_all('folder', [
-    'driver', 'driver/interlocks', 'driver/reads', 'driver/writes', 'plan', 'ports', 'settings'])
+    'driver', 'driver/kernel', 'driver/reads', 'driver/writes', 'plan', 'ports', 'settings'])
 def test_map_of_a_folder_names_what_is_there(folder: str) -> None:
     named = set((PACKAGE / folder / '__init__.py').read_text(encoding='utf-8').split('``')[1::2])
     there = {path.stem for path in (PACKAGE / folder).iterdir()} | {'check', 'df1', 'driver'}

@@ -26,7 +26,7 @@ from abdf1_ros.counters import numbered
 from abdf1_ros.df1.frames import Code
 from abdf1_ros.diagnosis.causes import diagnose, RULES
 from abdf1_ros.driver.guest_rules import right_for
-from abdf1_ros.driver.writes.reasons import IN_ORDER
+from abdf1_ros.driver.kernel.reasons import IN_ORDER
 from abdf1_ros.messages import Message, Severity
 from abdf1_ros.numbers import ValueKind
 from abdf1_ros.pccc.access import Access

@@ -58,6 +58,15 @@ class Task(Protocol):
         """Record that there will be no reply."""
 
 
+class LineTime(Protocol):
+    """The clock of a line, such as its machine: see ``df1.machine.Machine``."""
+
+    now: float
+    late: float
+
+    def took(self, begun: float, now: float) -> float: ...
+
+
 @dataclass(slots=True)
 class Outstanding:
     """

@@ -18,15 +18,13 @@ The reads and writes of one line, and their results, without a clock, thread, po
 Begin with ``driver``: its docstring says where each fact lives. ``agenda`` alone decides which job
 has the line next. The queues yield jobs (``job_tasks``):
 
-- ``interlocks``: writes of the bridge itself.
-- ``writes``: the messages.
+- ``kernel``: what may be written, by messages and by the bridge itself; ``writes`` sends it.
 - ``checks``: questions to a station.
 - ``reads``: the planned reads.
 - ``guests``: commands of other programs.
 
 The other modules are
 
-- ``flights``: all writes that still say something about words of a PLC.
 - ``served``: the words of our own table, which PLCs read and write.
 - ``requests``: single requests without a map.
 

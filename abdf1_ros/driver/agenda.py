@@ -15,7 +15,7 @@
 """
 The one place that decides which job has the line next.
 
-Heartbeats and fallbacks (``interlocks``) go first. A check or read has its turn after
+Heartbeats and fallbacks go first. A check or read has its turn after
 ``OWN_IN_A_ROW`` of them, and after each of them to a silent station. At the end no check or read
 goes before all PLCs that answer have confirmed theirs. Then there are three queues:
 
@@ -47,12 +47,11 @@ from abdf1_ros.df1.probes import Probes
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.checks import Checks
 from abdf1_ros.driver.guests import GuestJob, GuestQueue
-from abdf1_ros.driver.interlocks.queue import Interlocks
 from abdf1_ros.driver.job_tasks import Job, JobTasks
+from abdf1_ros.driver.kernel.kernel import Kernel, Rank
 from abdf1_ros.driver.reads.silent import Reads
 from abdf1_ros.driver.write import key_of
-from abdf1_ros.driver.writes.queue import WriteQueue
-from abdf1_ros.driver.writes.under_way import WriteJob
+from abdf1_ros.driver.writes.jobs import WriteJob, WritesUnderWay
 from abdf1_ros.plan.bounds import OURS_BESIDE_GUESTS, OWN_IN_A_ROW
 
 MAX_WRITES_IN_A_ROW = 4
@@ -118,12 +117,13 @@ class Agenda:
     Jobs under way are in ``tasks``: each packet of a write has a turn of its own.
     """
 
-    def __init__(self, stations: ActiveStationList, interlocks: Interlocks, writes: WriteQueue,
+    def __init__(self, stations: ActiveStationList, kernel: Kernel, writing: WritesUnderWay,
                  checks: Checks, reads: Reads, guests: GuestQueue, tasks: JobTasks) -> None:
         self._stations = stations
-        self._interlocks = interlocks
-        self._has_own = bool(interlocks.heartbeats or interlocks.fallbacks)
-        self._writes = writes
+        self._kernel, self._writing = kernel, writing
+        self._turns, self._end = kernel.turns, kernel.end
+        self._has_own = bool(kernel.rows.plc_of)
+        self._messages = kernel.waiting.writes
         self._checks = checks
         self._reads = reads
         self._guests = guests
@@ -170,12 +170,13 @@ class Agenda:
             return write
         is_limited = self._questions >= _QUICK_QUESTIONS and now < self._next_question
         if is_limited:
-            own, guests = self._interlocks, self._guests
+            guests = self._guests
             self._held_until = self._next_question \
                 if guests.inbox.items or guests.waiting else math.inf
             return self._has_own and (
                 self._tasks.continued(now, busy, _is_own)  # with all its packets
-                or own.next(now, busy) or own.refresh(now, busy)) or None
+                or self._begin(Rank.OWN, now, busy)
+                or self._begin(Rank.REFRESH, now, busy)) or None
         job = self._own_first(now, busy) if self._has_own else self._usual(now, busy)
         if job is not None:
             self._questions += 1
@@ -184,29 +185,28 @@ class Agenda:
 
     def _own_first(self, now: float, busy: Container[int]) -> Job | None:
         """Return the next job: own writes first, not counted as ``writes`` in a row (rule 11)."""
-        if self._interlocks.end.is_asked:  # no read has a turn now (rule 5)
+        if self._end.is_asked:  # no read has a turn now (rule 5)
             self._own_in_a_row, self._was_vain = 0, False
-        if self._own_in_a_row >= OWN_IN_A_ROW and not self._interlocks.is_beats_turn(now):
+        if self._own_in_a_row >= OWN_IN_A_ROW and not self._turns.is_beats_turn(now):
             if busy and self._last_read is not None and self._last_read not in busy:
                 # Stations take turns: with eight, the read might be for the same one each time.
                 self._last_read = None
             elif job := self._check_or_read(now, busy):
                 self._own_in_a_row, self._last_read = 0, job.station
-                self._interlocks.beats_gave_way()
+                self._turns.beats_gave_way()
                 return job
         # Remaining packets of a long fallback go first: heartbeats that are always due would keep
         # them waiting. Where the fallback stands, heartbeats count and must not wait for it.
         # A packet to a silent station takes a whole Timeout, and so does a packet of an odd row.
         # So a write to a station that answers goes between.
-        own: Job | None = self._was_vain and self._interlocks.next(
-            now, busy, only_active=True) or None
-        own = own or self._tasks.continued(now, busy, self._interlocks.is_urgent)
+        own: Job | None = self._was_vain and self._begin(Rank.ACTIVE, now, busy) or None
+        own = own or self._tasks.continued(now, busy, self._is_urgent)
         if own is None and self._was_vain:  # after all packets of such a try
             self._was_vain = False
             if job := self._check_or_read(now, busy):
                 return job
-        own = own or self._interlocks.next(now, busy)
-        own = own or self._tasks.continued(now, busy, self._interlocks.is_awaited)
+        own = own or self._begin(Rank.OWN, now, busy)
+        own = own or self._tasks.continued(now, busy, self._is_awaited)
         if own is None:
             return self._usual(now, busy)
         self._own_in_a_row += 1
@@ -214,31 +214,43 @@ class Agenda:
             own.key, own.station)
         return own
 
+    def _begin(self, rank: Rank, now: float, busy: Container[int]) -> WriteJob | None:
+        """Return the next write of a rank."""
+        turn = self._kernel.next(now, rank, busy)
+        return WriteJob(turn, self._writing) if turn is not None else None
+
+    def _is_urgent(self, job: Job) -> bool:
+        return isinstance(job, WriteJob) and self._turns.is_urgent(job.flight)
+
+    def _is_awaited(self, job: Job) -> bool:
+        return isinstance(job, WriteJob) and self._turns.is_awaited(
+            job.flight, self._tasks.line.now)
+
     def _check_or_read(self, now: float, busy: Container[int]) -> Job | None:
-        return self._checks.find_due(now) and self._check(now, busy) or self.read(now, busy)
+        return now >= self._checks.next_due and self._check(now, busy) or self.read(now, busy)
 
     def _usual(self, now: float, busy: Container[int]) -> Job | None:
         if self._tasks.waiting and (rewriting := self._tasks.continued(now, busy, _is_rewriting)):
             self._writes_in_a_row += 1
             return rewriting
-        has_writes = self._writes.waiting or self._tasks.waiting
+        has_writes = self._messages or self._tasks.waiting
         if has_writes and self._writes_in_a_row < MAX_WRITES_IN_A_ROW \
                 and not self._gives_way() and (write := self._write(now, busy)):
             return write
         guests = self._guests
         # At the end a guest could overwrite a fallback that is confirmed already.
-        has_guests = (guests.inbox.items or guests.waiting) and not self._interlocks.end.is_asked
+        has_guests = (guests.inbox.items or guests.waiting) and not self._end.is_asked
         is_held = has_guests and now < self._share.begins
         self._held_until = self._share.begins if is_held else math.inf
         has_guests = has_guests and not is_held
         if has_guests and self._share.is_turn and (guest := self._guest(now, busy)):
             return guest
-        if self._has_own and self._interlocks.end.keeps_line:
+        if self._has_own and self._end.keeps_line:
             self._is_reads_turn = False
             return self._refresh(now, busy) or has_writes and self._write(now, busy) or None
         if self._stations.probes.died_at > -math.inf and (late := self._after_death(now, busy)):
             return late
-        job = self._checks.find_due(now) and self._check(now, busy) \
+        job = now >= self._checks.next_due and self._check(now, busy) \
             or self._has_own and self._refresh(now, busy) or self.read(now, busy)
         if job and self._share.owed > 0:
             self._share.counted.append(job.start(self._tasks, now))
@@ -251,7 +263,7 @@ class Agenda:
 
         These are the reads that were due when a message got no whole reply last.
         """
-        odd, waiting = self._stations.odd, self._writes.waiting
+        odd, waiting = self._stations.odd, self._messages
         return bool(odd.failed and waiting) \
             and odd.failures(key_of(waiting[0].mapping, is_own=False)) > 0 \
             and self._reads.find_due(odd.message_failed_at)
@@ -268,7 +280,7 @@ class Agenda:
             return job
         if not is_kept_waiting:
             probes.caught_up()
-        return self._write(now, busy) if self._writes.waiting else None
+        return self._write(now, busy) if self._messages else None
 
     def _guest(self, now: float, busy: Container[int]) -> Job | None:
         """Return a command of a guest."""
@@ -286,7 +298,7 @@ class Agenda:
         under_way = self._tasks.first(busy)
         write = None
         if under_way is None or not self._has_begun_write:
-            write = self._writes.next(now, busy)
+            write = self._begin(Rank.MESSAGE, now, busy)
         if write or under_way:
             self._has_begun_write = write is not None
             self._writes_in_a_row += 1
@@ -310,7 +322,7 @@ class Agenda:
         self._last_check, self._is_reads_turn = now, True
         self._last_probe_was_check |= check.is_probe
         self._last_odd_was_check |= self._stations.odd.is_odd(check.key)
-        if self._writes.waiting:
+        if self._messages:
             self._writes_in_a_row = MAX_WRITES_IN_A_ROW
         return check
 
@@ -319,7 +331,7 @@ class Agenda:
         if self._is_reads_turn and self._reads.find_due(now) \
                 or self._tasks.first((), _is_own):
             return None
-        own = self._interlocks.refresh(now, busy)
+        own = self._begin(Rank.REFRESH, now, busy)
         if own is not None:
             self._is_reads_turn = True
             if not self._reads.find_due(now):  # then the turn of the writes begins again
@@ -353,9 +365,9 @@ class Agenda:
 
     def next_due(self) -> float:
         """Return when the next job is due (clock value in s), infinite for never."""
-        if self._has_own and self._interlocks.end.keeps_line:
-            return self._interlocks.next_due()
+        if self._has_own and self._end.keeps_line:
+            return self._turns.next_due()
         due = min(self._reads.next_due(), self._checks.next_due, self._held_until)
         if not self._tasks.is_heard and self._questions >= _QUICK_QUESTIONS:
             due = max(due, self._next_question)
-        return min(due, self._interlocks.next_due()) if self._has_own else due
+        return min(due, self._turns.next_due()) if self._has_own else due

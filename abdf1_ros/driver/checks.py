@@ -32,8 +32,9 @@ import math
 from operator import attrgetter
 
 from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.df1.tasks import LineTime
 from abdf1_ros.driver.inbox import Inbox
-from abdf1_ros.driver.job_tasks import Job, LineTime
+from abdf1_ros.driver.job_tasks import Job
 from abdf1_ros.errors import FormatError, LinkError, RemoteError
 from abdf1_ros.pccc import diagnostics
 from abdf1_ros.pccc.dialect import Steps
@@ -133,7 +134,7 @@ class Checks:
         self._told = told
         self._line = line
         self._known: dict[int, StationHealth] = {}
-        self._requests: Inbox[int] = Inbox(is_open=False)
+        self.requests: Inbox[int] = Inbox(is_open=False)
         self._wanted = wanted or {}
         periods = {station.number: min(self._wanted.get(station.number, math.inf),
                                        period or math.inf) for station in stations}
@@ -161,12 +162,12 @@ class Checks:
         request begins.
         """
         self.counters_wanted.add(station)
-        if not self._requests.put(station):
+        if not self.requests.put(station):
             self.counters_wanted.discard(station)
 
     def begin(self, now: float) -> None:
         """Make all checks due: the port has been opened."""
-        self._requests.open()
+        self.requests.open()
         for check in self.jobs:
             check.due = now
         self._plan()
@@ -175,7 +176,7 @@ class Checks:
         """Forget all that depends on the port: it is lost."""
         for station in self._stations:
             self._forget(station.number, reason)
-        for number in {*self._requests.close(), *tuple(self.counters_wanted)}:
+        for number in {*self.requests.close(), *tuple(self.counters_wanted)}:
             self._take_counters(number, {}, reason)
 
     def ask_status(self, station: int, due: float) -> None:
@@ -190,12 +191,10 @@ class Checks:
         self._forget(station, 'the station does not answer')
         self.ask_status(station, math.inf)
 
-    def find_due(self, now: float) -> bool:
-        """Take new requests; return True if a check is due."""
-        if self._requests.items:
-            for station in self._requests.take():
-                self._add_request(station, now)
-        return now >= self.next_due
+    def take_requests(self, now: float) -> None:
+        """Take the requests of other threads."""
+        for station in self.requests.take():
+            self._add_request(station, now)
 
     def next(self, now: float, busy: Container[int], probe_from: float,  # noqa: A003
              odd_from: float, may_go: Callable[[Check], bool]) -> Check | None:

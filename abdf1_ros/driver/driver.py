@@ -23,16 +23,16 @@ line.
 Where each fact lives:
 
 ==================================================  ============================================
-what may still land, what stands, unread results    ``flights.Flights``, ``flights.Words``
-messages that wait                                  ``writes.queue.WriteQueue.waiting``
+what may still land, what stands, unread results    ``kernel.flights``: ``Flights``, ``Words``
+messages that wait                                  ``kernel.waiting.WaitingWrites``
 commands of guests that wait                        ``guests.Guest.waiting``
 calls that wait for a read                          ``reads.demands.ReadCalls.waiting``
 until when a command may be sent                    ``job_tasks.Job.expires``
 commands of jobs under way                          ``job_tasks.JobTasks``
-when an own row has to be looked at                 its ``look``; ``interlocks.plc.Looks`` keep it
-how a PLC answers our own writes, a change to RUN   ``interlocks.plc.Plc``
-last message of a topic, executor, the end          ``interlocks.own.Conditions``
-whether a topic has more than one publisher         ``interlocks.own.Conditions``
+when an own row has to be looked at                 its ``look``; ``kernel.plc.Looks`` keep it
+how a PLC answers our own writes, a change to RUN   ``kernel.plc.Plc``
+last message of a topic, executor, the end          ``kernel.own.Conditions``
+whether a topic has more than one publisher         ``kernel.own.Conditions``
 mode and type of a PLC                              ``checks.Checks.known``
 whether a station answers                           ``df1.stations.Station``
 last value, freshness, withheld                     ``reads.point.ReadPoint``
@@ -56,12 +56,13 @@ from abdf1_ros.df1.stations import ActiveStationList, Station
 from abdf1_ros.df1.tasks import Task
 from abdf1_ros.driver.agenda import Agenda, QUESTION_PERIOD
 from abdf1_ros.driver.checks import Checks
-from abdf1_ros.driver.flights import Flights
 from abdf1_ros.driver.guest_rules import GuestRules
 from abdf1_ros.driver.guests import GuestQueue
 from abdf1_ros.driver.inbox import Inbox
-from abdf1_ros.driver.interlocks.queue import Interlocks
 from abdf1_ros.driver.job_tasks import JobTasks
+from abdf1_ros.driver.kernel.kernel import ForeignValue, Kernel, NOT_HEARD, Refused
+from abdf1_ros.driver.kernel.reasons import WriteReasons
+from abdf1_ros.driver.kernel.waiting import MAX_WAITING_WRITES
 from abdf1_ros.driver.overheard import Overheard
 from abdf1_ros.driver.reads.demands import ReadAnswer, ReadCall
 from abdf1_ros.driver.reads.readings import Readings, ValueListener
@@ -69,12 +70,9 @@ from abdf1_ros.driver.refused import RefusedCommands
 from abdf1_ros.driver.served import Served
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome, show, Write, WriteResult
-from abdf1_ros.driver.writes.queue import MAX_WAITING_WRITES, WriteQueue
-from abdf1_ros.driver.writes.reasons import WriteReasons
-from abdf1_ros.driver.writes.under_way import is_message_of, WritesUnderWay
+from abdf1_ros.driver.writes.jobs import is_message_of, WritesUnderWay
 from abdf1_ros.errors import FormatError, INTERNAL_ERROR, PortLost
 from abdf1_ros.messages import Event
-from abdf1_ros.pccc.extent import OUR_TABLE
 from abdf1_ros.pccc.families import served_counters
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity
@@ -85,7 +83,6 @@ from abdf1_ros.settings.resets import lost_by_reset
 from abdf1_ros.settings.rows import Rows
 
 _NOT_OPEN = 'the port is not open'
-_NOT_HEARD = 'nothing has been heard on this connection'
 ENDS = 'this node ends'
 TOO_MANY = 'too many writes are waiting'
 
@@ -150,45 +147,35 @@ class Driver:
     def _make_queues(self) -> None:
         """Make the queues of jobs, and the agenda that decides between them."""
         network, settings, machine = self.network, self._settings, self.machine
-        report = self._listener.written
-        self._flights = flights = Flights(
-            machine, 2 * network.cmd_timeout / 1000, self.stations, settings.write_timeout, report)
+        self.tasks = JobTasks(network.station, settings.first_tns, machine, self.stations.odd)
+        self.served = self._make_served()
+        self.kernel = Kernel(
+            self.mappings, Rows() if settings.read_only else self.mappings, self.stations, machine,
+            self.tasks, self.served, settle_time=2 * network.cmd_timeout / 1000,
+            patience=settings.write_timeout, tx_delay=network.timing.tx_delay,
+            seed=settings.first_tns)
         self.readings = Readings(
             network, self._active_rows(), settings, self.stations, machine, self._listener,
-            flights)
+            self.kernel)
         self.points = self.readings.points
         self._demands = self.readings.demands
-        self.served = self._make_served()
         self.refused = RefusedCommands(PlcType(network.plc_type))
-        writing = WritesUnderWay(
-            self.stations, flights, self.readings)
+        writing = WritesUnderWay(self.stations, machine, self.kernel, self.readings)
         self.spent = writing.spent
-        self._writes = WriteQueue(self.stations, writing, settings.write_timeout, report,
-                                  self._leave_out, network.timing.tx_delay)
         self.checks = Checks(
             self.stations, {block.station for block in self.readings.blocks},
             settings.processor_period, machine, self.readings.link_failed,
             self._station_told, self.readings.mode_periods)
-        self.interlocks = Interlocks(
-            Rows() if settings.read_only else self.mappings, self._writes, writing, self.served,
-            self._listener, self._foreign_value, settings.first_tns)
         self.guests = GuestQueue(
             self.stations, machine, network.cmd_timeout / 1000,
-            GuestRules(network, self.mappings, self._processor_of), flights, self._fell_silent)
-        compares = (self.interlocks,) if self.interlocks.heartbeats else ()
-        for row in self.mappings:
-            if row.write_again:
-                flights.words_of(row)
-        flights.connect((self.readings.reads, self.interlocks), (flights, *compares))
-        self.tasks = JobTasks(network.station, settings.first_tns, machine, self.stations.odd)
-        self._agenda = Agenda(self.stations, self.interlocks, self._writes, self.checks,
+            GuestRules(network, self.mappings, self._processor_of), writing, self._fell_silent)
+        self._agenda = Agenda(self.stations, self.kernel, writing, self.checks,
                               self.readings.reads, self.guests, self.tasks)
 
     def take_over(self, before: Driver) -> None:
         """Take what the driver of the old files knows: new files change nothing on the line."""
         self.served.take_over(before.served)
-        self._flights.take_over(before._flights)
-        self.interlocks.end.take_over(before.interlocks.end)
+        self.kernel.take_over(before.kernel)
         for station in before.stations:
             if station.number in self.stations:
                 self.stations[station.number].has_gateway |= station.has_gateway
@@ -225,18 +212,8 @@ class Driver:
         return WriteReasons(
             read_only='this node is read_only' if self._settings.read_only else '',
             closed='' if self.is_online else _NOT_OPEN,
-            ends=ENDS if self.interlocks.end.is_asked else '',
+            ends=ENDS if self.kernel.end.is_asked else '',
             crowded=TOO_MANY if len(self._inbox) + count > MAX_WAITING_WRITES else '')
-
-    def _reasons_in_turn(self, write: Write, now: float) -> WriteReasons:
-        """Return what is against a message that comes to the link's thread."""
-        own, must_be_heard = self.interlocks, not write.mapping.serves and any(self.stations)
-        return WriteReasons(
-            publishers=own.why_refused(write),
-            overruled='fallback' if own.is_overruled(write) else '',
-            put_off='fallback' if own.is_put_off(write) else '',
-            waited=self._writes.why_too_old(write, now),
-            unheard=_NOT_HEARD if must_be_heard and not self.tasks.is_heard else '')
 
     def read_now(self, mapping: Mapping, answer: Callable[[ReadAnswer], None]) -> None:
         """
@@ -247,7 +224,7 @@ class Driver:
         """
         if self.overheard is not None:
             answer(ReadAnswer(error=f'Mode {self.network.mode}: nothing is sent'))
-        elif self.interlocks.end.is_asked:
+        elif self.kernel.end.is_asked:
             answer(ReadAnswer(error=ENDS))
         elif not self._demands.inbox.put(ReadCall(mapping, answer)):
             answer(ReadAnswer(error=_NOT_OPEN))
@@ -268,8 +245,11 @@ class Driver:
         plc_type, mode = PlcType(self.network.plc_type), self.network.mode
         counters = served_counters(self.counters, plc_type, mode)
         return Served(
-            plc_type, self.mappings, self.readings.served, counters,
+            plc_type, self.mappings, self._written_by_plc, counters,
             self.network.duplex is Duplex.FULL)
+
+    def _written_by_plc(self, mapping: Mapping, words: bytes) -> None:
+        self.readings.served(mapping, words)
 
     def next_task(self, now: float, busy: Container[int] = ()) -> Task | None:
         """Return the command that has the line next, not for a ``busy`` station."""
@@ -277,7 +257,12 @@ class Driver:
             self._sort_inbox(now)  # the machine has expired jobs that have waited too long
         if self._demands.inbox.items:
             self.readings.take_demands(now)
-        return self._agenda.next(now, busy)
+        if self.checks.requests.items:
+            self.checks.take_requests(now)
+        job = self._agenda.next(now, busy)
+        if self.kernel.out:
+            self._take_news()
+        return job
 
     def next_due(self) -> float:
         """Return when the next job is due (clock value in s), infinite for never."""
@@ -287,33 +272,48 @@ class Driver:
         """Do the work that needs no line: store values that we serve, end expired jobs."""
         self._sort_inbox(now)
         self.readings.take_demands(now)
-        self.interlocks.expire(now)
-        self._writes.expire(now)
+        self.kernel.expire(now)
         self.tasks.expire(now)
         self.guests.expire(now)
-        self._flights.expire(now)
         if now >= self._demands.next_expiry:
             self._demands.expire(now)
+        self._take_news()
 
     def next_expiry(self) -> float:
         """Return when ``expire`` has work (clock value in s), infinite for never."""
-        due = min(self._writes.next_expiry, self.tasks.next_expiry, self.guests.next_expiry,
-                  self.interlocks.ours.looks.first, self._demands.next_expiry)
-        return min(due, self._flights.next_expiry) if self._flights.unread else due
+        if self.kernel.out:
+            return self.machine.now
+        return min(self.kernel.next_expiry, self.tasks.next_expiry, self.guests.next_expiry,
+                   self._demands.next_expiry)
+
+    def _take_news(self) -> None:
+        """Hand on what has come of the events of the kernel."""
+        news, listener = self.kernel.out, self._listener
+        while news:
+            match news.popleft():
+                case WriteResult() as result:
+                    listener.written(result)
+                case Refused(mapping, text):
+                    listener.unreadable(mapping, text)
+                case ForeignValue(mapping, text, is_conflict):
+                    # A PLC with a download is not in RUN.
+                    self.checks.ask_status(mapping.station, self.machine.now)
+                    listener.foreign_value(mapping, text, is_conflict)
 
     def _gateway_replied(self, number: int) -> None:
-        self._flights.gateway_replied(number)
+        self.kernel.gateway_replied(number)
 
     def _station_changed(self, station: Station) -> None:
-        self._flights.forget(station.number)
+        self.kernel.station_changed(
+            station.number, self.machine.now, is_active=station.active)
         if station.active:
             self.readings.reads.release(station.number, self.machine.now)
-            self.interlocks.contact(station.number, self.machine.now)
             self.checks.ask_status(station.number, self.machine.now)
         else:
             self.checks.went_away(station.number)
             self.readings.station_lost(station.number)
             self._fell_silent()
+        self._take_news()
         self._listener.station_changed(station)
 
     def _fell_silent(self) -> None:
@@ -328,38 +328,15 @@ class Driver:
 
     def _sort_inbox(self, now: float) -> None:
         """Store messages of Serve rows in our table; let all others wait for the line."""
-        for mapping, why in self.interlocks.new_crowds(now):
-            self._writes.drop(why, now, mapping)
+        for mapping, why in self.kernel.new_crowds(now):
             self.tasks.stop(partial(is_message_of, mapping), why)
         for write in self._inbox.take():
-            reasons = self._reasons_in_turn(write, now)
-            if not reasons.publishers and not reasons.overruled:
-                self.interlocks.message_came(write)
-            if reasons.first:
-                self._end_write(write, *reasons.first)
-            elif not write.mapping.serves:
-                self._writes.add(write, now)
-            else:
-                self.served.store(write.mapping, write.raw)
-                self._flights.ended(self._flights.begin(
-                    OUR_TABLE, (write.mapping.extent,), write), Outcome.WRITTEN)
-                self._end_write(write, Outcome.WRITTEN)
-
-    def _leave_out(self, write: Write, now: float) -> str:
-        """Return the proof that a message need not be written, empty for no proof."""
-        proof = self._flights.proof(write, now)
-        if not proof or not self.interlocks.may_stand(write):
-            return ''
-        self.interlocks.stands(write)
-        return f'{proof}; not written again'
-
-    def _end_write(self, write: Write, outcome: Outcome, detail: str = '') -> None:
-        for result in write.result(outcome, detail).of(write.origins, self.machine.now):
-            self._listener.written(result)
+            self.kernel.asked(write, now)
 
     def serve(self, command: Packet) -> Packet:
         """Execute a command of a PLC or master, after all messages that came before it."""
         self._sort_inbox(self.machine.now)
+        self._take_news()
         reply = self.served.serve(command)
         if reply.sts:
             self.refused.add(command, reply, self.machine.now)
@@ -377,7 +354,7 @@ class Driver:
                 and (network.share or any(self.stations)):
             self.tasks.connect()
             if any(self.stations):
-                self._writes.drop(_NOT_HEARD, self.machine.now)
+                self.kernel.drop(NOT_HEARD, self.machine.now)
                 self.tasks.end_messages()
 
     def _run(self) -> Procedure:
@@ -389,7 +366,7 @@ class Driver:
             self.overheard.begin(self.machine.now)
         self.readings.begin(self.machine.now)
         self.checks.begin(self.machine.now)
-        self.interlocks.begin(self.machine.now)
+        self.kernel.opened(self.machine.now)
         self._inbox.open()
         self._demands.inbox.open()
         self.guests.begin()
@@ -406,21 +383,12 @@ class Driver:
         self.guests.end()
         self.checks.end(str(error))
         self.readings.port_lost(str(error))
-        for write in self._inbox.close():
-            self._end_write(write, Outcome.NOT_SENT, str(error))
-        self._writes.drop(str(error), self.machine.now)
-        self._flights.port_lost()
-
-    def _foreign_value(self, mapping: Mapping, text: str, is_conflict: bool) -> None:
-        """Report the value; ask for the mode at once: a PLC with a download is not in RUN."""
-        self.checks.ask_status(mapping.station, self.machine.now)
-        self._listener.foreign_value(mapping, text, is_conflict)
+        self.kernel.lost(self._inbox.close(), str(error), self.machine.now)
+        self._take_news()
 
     def _station_told(self, station: int, identity: Identity | None, asked: float) -> None:
         """Use the answer of a station: its mode, and the packets that it accepts."""
         if identity is not None and identity.is_running is not None:
-            is_running = identity.is_running and not identity.faults
-            if not is_running:  # a download may follow
-                self._flights.forget(station)
-            self.interlocks.mode_seen(station, is_running, self.machine.now)
+            self.kernel.mode_seen(station, self.machine.now,
+                                  is_running=identity.is_running and not identity.faults)
         self.readings.told(station, identity, asked)

@@ -35,12 +35,14 @@ import math
 from abdf1_ros.df1.packet import BROADCAST, is_local_status, Packet
 from abdf1_ros.df1.probes import Asker
 from abdf1_ros.df1.stations import ActiveStationList
-from abdf1_ros.driver.flights import Flight, Flights
+from abdf1_ros.df1.tasks import LineTime
 from abdf1_ros.driver.guest_rules import GuestRules, ShareAccess
 from abdf1_ros.driver.inbox import Inbox
-from abdf1_ros.driver.job_tasks import Job, LineTime
+from abdf1_ros.driver.job_tasks import Job
+from abdf1_ros.driver.kernel.flights import Flight
 from abdf1_ros.driver.unanswered import UnansweredCommands
 from abdf1_ros.driver.write import outcome_of
+from abdf1_ros.driver.writes.jobs import WritesUnderWay
 from abdf1_ros.errors import (
     CommandExpired,
     CommandTimeout,
@@ -164,18 +166,18 @@ class GuestQueue:
     The commands of all guests, in turns.
 
     ``put`` may be called from any thread. A command that has waited ``patience`` s is not sent any
-    more. ``rules`` say what is allowed. Each command that may change words is in ``flights``.
+    more. ``rules`` say what is allowed. Each command that may change words is in ``writing``.
     ``fell_silent`` is called when a station that only guests ask has become silent.
     """
 
     def __init__(self, stations: ActiveStationList, line: LineTime, patience: float,
-                 rules: GuestRules, flights: Flights,
+                 rules: GuestRules, writing: WritesUnderWay,
                  fell_silent: Callable[[], None] = lambda: None) -> None:
         self._stations = stations
         self.line = line
         self._patience = patience
         self._rules = rules
-        self._flights = flights
+        self._writing = writing
         self._fell_silent = fell_silent
         self._unanswered = UnansweredCommands()
         self.inbox: Inbox[GuestCommand] = Inbox(is_open=False)  # commands not sorted yet
@@ -257,7 +259,7 @@ class GuestQueue:
         """
         for guest in self.waiting:
             station = self._rules.station_of(guest.waiting[0].packet.dst)
-            if station not in busy and not (station == BROADCAST and self._flights.is_rewriting):
+            if station not in busy and not (station == BROADCAST and self._writing.is_rewriting):
                 return guest
         return None
 
@@ -265,7 +267,7 @@ class GuestQueue:
         """Record a command that may change words."""
         if not effect_of(packet).may_change_words:
             return None
-        return self._flights.begin(station, self._rules.words_of(packet, station))
+        return self._writing.begin_guest(station, self._rules.words_of(packet, station))
 
     def expiry(self, command: GuestCommand) -> float:
         """Return the clock value (s) from which a command is too old."""
@@ -302,7 +304,7 @@ class GuestQueue:
             self._give_up(command, _status_of(error, was_sent))
         if (flight := job.flight) is not None:
             fault = _fault_of(job.sts, error)
-            self._flights.ended(flight, outcome_of(station, fault), fault)
+            self._writing.landed(flight, outcome_of(station, fault), fault)
             if was_sent:
                 command.guest.listener.wrote(command.guest, command.packet, flight)
         self._stations.tried(

@@ -25,11 +25,12 @@ from collections import deque
 from collections.abc import Callable, Container, Hashable
 from inspect import GEN_CLOSED, getgeneratorstate
 import math
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
 from abdf1_ros.df1.odd import OddCommands
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.probes import Asker
+from abdf1_ros.df1.tasks import LineTime
 from abdf1_ros.errors import (
     Abdf1Error,
     CommandExpired,
@@ -41,15 +42,6 @@ from abdf1_ros.pccc.dialect import Request, Steps
 from abdf1_ros.pccc.notation import Effect
 
 _With = TypeVar('_With', Packet, LinkError)
-
-
-class LineTime(Protocol):
-    """The clock of a line, such as its machine: see ``df1.machine.Machine``."""
-
-    now: float
-    late: float
-
-    def took(self, begun: float, now: float) -> float: ...
 
 
 class Job:
@@ -165,18 +157,13 @@ class Job:
     def _advance(self, resume: Callable[[_With], Request], what: _With) -> None:
         try:
             request = resume(what)
-        except StopIteration:
-            self._tasks.under_way.discard(self)
-            if self._tasks.odd.failed:
-                self._settle()
-            self.ended(None)
-            return
-        except Exception as error:
+        except Exception as raised:
+            error = None if raised.__class__ is StopIteration else raised
             self._tasks.under_way.discard(self)
             if self._tasks.odd.failed:
                 self._settle()
             self.ended(error)
-            if not isinstance(error, Abdf1Error):
+            if error is not None and not isinstance(error, Abdf1Error):
                 raise  # a bug
             return
         self.sent, self.reply_size = False, 0

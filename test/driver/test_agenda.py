@@ -21,6 +21,7 @@ import math
 
 from abdf1_ros.driver.agenda import MAX_WRITES_IN_A_ROW, QUESTION_PERIOD
 from abdf1_ros.driver.job_tasks import Job
+from abdf1_ros.driver.kernel.kernel import Rank
 from abdf1_ros.driver.reads.job import ReadJob
 from abdf1_ros.driver.write import Outcome, Write
 from abdf1_ros.pccc.dialect import Steps
@@ -69,8 +70,8 @@ def test_message_has_its_patience_and_a_fallback_bounds_all_packets(
     bench, row = Bench(), make_mapping('N7:5', 'Write', fallback=fallback)
     for published in (1.0, 0.75):  # equal ones; the younger counts
         bench.write(row, 1, published)
-    job = bench.writes.next(1.0)
-    assert job is not None and (job.expires, job.patience, job.latest) == limits
+    turn = bench.kernel.next(1.0, Rank.MESSAGE)
+    assert turn is not None and (turn.expires, turn.patience, turn.latest) == limits
 
 
 def test_four_writes_in_a_row_and_then_a_read_that_is_due() -> None:
@@ -238,7 +239,7 @@ def test_youngest_message_is_the_one_published_last() -> None:
     bench, row = Bench(), make_mapping('B3:0/5', 'Write', fallback=Fallback((0,), 500))
     for value, published in ((1, 1.0), (0, 0.5)):
         bench.write(row, value, published)
-    assert bench.writes.youngest() == {row: 1.0}
+    assert bench.waiting.youngest() == {row: 1.0}
 
 
 def test_change_gives_way_to_a_newer_one_after_half_the_time_that_it_may_wait() -> None:
@@ -296,7 +297,7 @@ def test_dropped_writes_all_have_their_result() -> None:
         bench.write(BIT, n % 2, 0.0)
     bench.begin_write(0.0)
     bench.write(WORD, 1, 0.5)
-    bench.writes.drop('the cable is off', 1.0)
+    bench.kernel.drop('the cable is off', 1.0)
     assert bench.outcomes() == [Outcome.NOT_SENT] * 3
     assert {result.detail for result in bench.results} == {'the cable is off'}
     assert [result.latency for result in bench.results] == [1.0, 1.0, 0.5]

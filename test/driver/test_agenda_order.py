@@ -102,13 +102,13 @@ class AnyOrder(RuleBasedStateMachine):
 
     @rule()
     def drop(self) -> None:
-        self.bench.writes.drop('port', self.now)
+        self.bench.kernel.drop('port', self.now)
         assert self.bench.begin_write(self.now) is None
 
     @invariant()
     def every_write_is_in_one_place(self) -> None:
         assert len(self.accepted) == len(self.sent) + len(self.bench.results) \
-            + len(self.bench.writes.waiting)
+            + len(self.bench.waiting.writes)
 
     @invariant()
     def every_job_is_in_one_place(self) -> None:

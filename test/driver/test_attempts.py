@@ -81,13 +81,13 @@ def test_rules_5_and_8_port_given_away_and_taken_ten_times_has_its_fallback_each
     for _ in range(10):
         interlocks.end(cell)
         store(cell.plc, 'N7:0', [OLD])  # as the program that has the port does
-        cell.bench.driver.interlocks.end.resume()
+        cell.bench.driver.kernel.end.resume()
         cell.bench.open(run=0.3)
         assert cell.word('N7:0') == 7
         cell.bench.write(speed, [3], run=0.1)
         assert cell.word('N7:0') == 3
     assert {*cell.results()} <= {interlocks.START, interlocks.RETURN, interlocks.END, 'written'}
-    row, = cell.bench.driver.interlocks.fallbacks
+    row, = cell.bench.driver.kernel.rows.fallbacks
     assert row.conditions.ended == math.inf  # the end does not bound a second write any more
 
 
@@ -167,11 +167,11 @@ def test_bridge_that_only_listens_sends_nothing_whatever_its_rows_ask_for() -> N
     beat, speed = interlocks.beat_row(), interlocks.speed_row()
     bench = ListeningBench([beat, speed, READ])  # it looks at what is sent all the time
     for number in range(20):
-        bench.driver.interlocks.executor_ran(bench.now)
+        bench.driver.kernel.executor_ran(bench.now)
         bench.driver.write([speed], [number], bench.now)
-        bench.driver.interlocks.contact(1, bench.now)
+        bench.driver.kernel.station_changed(1, bench.now, is_active=True)
         bench.run(0.5)
-    bench.driver.interlocks.end.wind_down()
+    bench.driver.kernel.end.wind_down()
     bench.run(5.0)
     assert Outcome.WRITTEN not in bench.listener.outcomes()
 

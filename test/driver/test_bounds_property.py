@@ -37,8 +37,8 @@ from abdf1_ros.df1.packet import BROADCAST, Packet, STS_NOT_DELIVERED
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave
 from abdf1_ros.driver.guest_rules import ShareAccess
-from abdf1_ros.driver.interlocks.plc import Plc
 from abdf1_ros.driver.job_tasks import Job
+from abdf1_ros.driver.kernel.plc import Plc
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
@@ -491,7 +491,7 @@ def test_rule_10_second_writes_and_heartbeats_take_turns_on_a_full_line() -> Non
         plc.faults.delay, bound.losses.is_due = 0.45, True
     bound.bench.run(40.0)
     assert max(bound.gaps.values()) < 6.96  # the preset
-    assert {row.again_at for row in bound.bench.driver.interlocks.fallbacks} == {math.inf}
+    assert {row.again_at for row in bound.bench.driver.kernel.rows.fallbacks} == {math.inf}
 
 
 @pytest.mark.parametrize('mode', ['Message', 'Standard', 'Peer'])

@@ -122,7 +122,7 @@ def test_fallback_may_be_kept_as_it_is_the_value_of_rest(mode: str) -> None:
     bench.run(20.0)
     for _ in range(100):
         bench.run(0.1)
-        assert bench.driver.next_due() <= bench.driver.interlocks.next_due()
+        assert bench.driver.next_due() <= bench.driver.kernel.turns.next_due()
     bench.let_through()
     bench.run(2.0)
     assert {*bench.values_written()} == {SAFE}
@@ -133,8 +133,8 @@ def test_packets_of_a_fallback_at_the_end_do_not_wait_for_questions() -> None:
                          fallback=Fallback((SAFE,) * 160, 1000))
     bench = Queue(rows=[lamps, make_mapping('N9:0', plc='SLC', period=200)])
     bench.run(30.0)
-    bench.driver.interlocks.end.wind_down()
-    bench.run_until(lambda: bench.driver.interlocks.end.is_over, 2.0)
+    bench.driver.kernel.end.wind_down()
+    bench.run_until(lambda: bench.driver.kernel.end.is_over, 2.0)
 
 
 def test_banner_noise_and_a_reply_to_another_client_are_not_heard() -> None:

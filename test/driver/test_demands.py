@@ -335,7 +335,7 @@ def test_lost_port_and_the_end_answer_every_call() -> None:
     assert [line.errors[-1], fresh[-1].error] == ['the port is not open'] * 2
     line.open(run=1.0)
     assert line.listener.values(RECIPE) == line.listener.values(TABLE) == []
-    line.driver.interlocks.end.wind_down()
+    line.driver.kernel.end.wind_down()
     line.ask(RECIPE)
     assert line.errors[-1] == 'this node ends'
 

@@ -237,7 +237,7 @@ class Interlocked(Bench):
         end = self.clock() + seconds
         while self.clock() < end:
             if self.is_alive:
-                self.driver.interlocks.executor_ran(self.clock())
+                self.driver.kernel.executor_ran(self.clock())
             self.run(0.1)
         return [*self.seen]
 

@@ -21,9 +21,9 @@ from random import Random
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave
+from abdf1_ros.driver.kernel.waiting import MAX_WAITING_WRITES
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome
-from abdf1_ros.driver.writes.queue import MAX_WAITING_WRITES
 from abdf1_ros.settings.heartbeats import Fallback
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network

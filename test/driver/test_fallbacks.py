@@ -22,12 +22,13 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave
 from abdf1_ros.df1.stations import ActiveStationList
-from abdf1_ros.driver.flights import Flight, Flights, Words
-from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackRow, FallbackState
-from abdf1_ros.driver.interlocks.own import Conditions
-from abdf1_ros.driver.interlocks.plc import Plc
+from abdf1_ros.driver.kernel.fallback import FallbackCause, FallbackRow, FallbackState
+from abdf1_ros.driver.kernel.flights import Flight, Flights, Words
+from abdf1_ros.driver.kernel.kernel import Rank
+from abdf1_ros.driver.kernel.own import Conditions
+from abdf1_ros.driver.kernel.plc import Plc
+from abdf1_ros.driver.kernel.waiting import WaitingWrites
 from abdf1_ros.driver.write import Outcome, Write
-from abdf1_ros.driver.writes.queue import WriteQueue
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.emulated import EmulatedProcessor, Setting
 from abdf1_ros.pccc.identity import Mode
@@ -278,7 +279,7 @@ def test_rule_7_messages_that_the_plc_refuses_do_not_keep_an_output_alive(gap: f
 def test_rule_7_fallback_waits_for_a_message_that_waits() -> None:
     cell, speed = speed_cell()
     cell.publish(speed, 3, run=0.1)
-    plc, (row,) = cell.bench.driver.interlocks.plcs[1], cell.bench.driver.interlocks.fallbacks
+    plc, (row,) = cell.bench.driver.kernel.rows.plcs[1], cell.bench.driver.kernel.rows.fallbacks
     due = row.refreshed + AFTER
     assert plc.ready({speed: due - 0.1}, due) == []
     assert plc.next_due(math.inf) == due - 0.1 + AFTER
@@ -291,7 +292,7 @@ def test_rule_7_fallback_waits_no_longer_for_a_message_that_has_expired(
     speed = speed_row(Fallback((7,), 2000))
     cell = Cell(speed, run=1.0, write_timeout=0.5)
     cell.publish(speed, 3, run=1.9)
-    monkeypatch.setattr(WriteQueue, 'next', lambda queue, now, busy: None)
+    monkeypatch.setattr(WaitingWrites, 'first', lambda waiting, busy: None)
     cell.publish(speed, 4, run=0.2)
     assert cell.word('N7:0') == 3  # the fallback waits for it
     cell.run(0.35)
@@ -305,7 +306,7 @@ def test_rule_7_fallback_waits_no_longer_for_a_message_that_an_unheard_connectio
     speed = speed_row(Fallback((7,), 2000))
     cell = Cell(speed, make_mapping('N7:9'), run=1.0, may_store=True)
     cell.publish(speed, 3, run=1.9)
-    monkeypatch.setattr(WriteQueue, 'next', lambda queue, now, busy: None)
+    monkeypatch.setattr(WaitingWrites, 'first', lambda waiting, busy: None)
     cell.publish(speed, 4, run=0.2)
     cell.bench.far.say = lambda data: b''
     cell.run(1.0)
@@ -370,7 +371,7 @@ def test_rule_2_message_before_the_last_fallback_makes_no_row_fresh() -> None:
     cell.publish(speed, 42, run=0.5)
     end(cell)
     store(cell.plc, 'N7:0', [1234])  # by another program, while the port is released
-    cell.bench.driver.interlocks.end.resume()
+    cell.bench.driver.kernel.end.resume()
     since = cell.now
     cell.bench.open(run=1.0)
     assert cell.word('N7:0') == 7
@@ -446,14 +447,14 @@ def test_rule_8_earliest_fallback_that_stands_of_a_station_that_is_not_busy_goes
     line = Line([make_mapping('N7:0', 'Write', station=number, fallback=FALLBACK)
                  for number in stations], stations)
     line.run(4.0)
-    interlocks = line.driver.interlocks
-    for number, row in enumerate(interlocks.fallbacks, 1):
+    kernel = line.driver.kernel
+    for number, row in enumerate(kernel.rows.fallbacks, 1):
         assert row.trial is not None
         row.trial.done -= number
-        interlocks.plcs[number].look_again(row)
-    first, second = (interlocks.refresh(9.0, busy) for busy in ({3}, set()))
-    assert first is not None and first.station == 2
-    assert second is not None and second.station == 3
+        kernel.rows.plcs[number].look_again(row)
+    first, second = (kernel.next(9.0, Rank.REFRESH, busy) for busy in ({3}, set()))
+    assert first is not None and first.flight.station == 2
+    assert second is not None and second.flight.station == 3
 
 
 @pytest.mark.parametrize(('event', 'waits'), [
@@ -486,7 +487,7 @@ def test_rule_8_message_that_is_lost_with_the_port_is_not_waited_for() -> None:
     recipe = make_mapping('N7:1', 'Write', length=150)
     cell = Cell(speed, recipe, run=1.0)
     cell.publish(speed, 3, run=0.5)
-    row, = cell.bench.driver.interlocks.fallbacks
+    row, = cell.bench.driver.kernel.rows.fallbacks
     cell.run(3.0)
     hear, cell.bench.far.hear = cell.bench.far.hear, lambda data: b''
     cell.bench.write(recipe, [1] * 150)
@@ -534,10 +535,10 @@ def test_rule_9_write_of_another_row_to_the_same_words_holds_up_for_its_own_time
     cell.bench.write(speed, [3], run=AFTER - 0.01)
     assert cell.word('N7:0') == 3
     cell.bench.write(recipe, [4] * 200)  # under way when the fallback is due
-    row, = cell.bench.driver.interlocks.fallbacks
+    row, = cell.bench.driver.kernel.rows.fallbacks
     tasks = cell.bench.driver.tasks
     cell.bench.run_until(lambda: row.cause is not None and bool(tasks.under_way))
-    assert cell.bench.driver.interlocks.next_due() > cell.now
+    assert cell.bench.driver.kernel.turns.next_due() > cell.now
     cell.run(0.5)
     assert cell.results()[-1] == TIMEOUT
     assert cell.word('N7:0') == 7
@@ -700,11 +701,11 @@ def test_rule_10_why_the_plc_refuses_is_told_once() -> None:
     reasons = cell.bench.listener.reasons
     assert sorted(address for address, _ in reasons) == ['N10:0', 'N7:0']
     assert all(reason.startswith('not written: STS 10: ') for _, reason in reasons)
-    interlocks = cell.bench.driver.interlocks
-    assert interlocks.fallbacks[0].refusal.startswith('STS 10: ')
+    own = cell.bench.driver.kernel.rows
+    assert own.fallbacks[0].refusal.startswith('STS 10: ')
     cell.refused = set()
     cell.run(2.0)
-    assert [interlocks.fallbacks[0].refusal, interlocks.heartbeats[0].refusal] == ['', '']
+    assert [own.fallbacks[0].refusal, own.heartbeats[0].refusal] == ['', '']
 
 
 def test_rule_8_fallbacks_that_stand_and_reads_take_turns_on_a_full_line() -> None:
@@ -744,7 +745,7 @@ def test_rule_8_packets_of_a_fallback_that_stands_wait_for_reads_in_most_cases(
                          fallback=Fallback((0,) * 320, 2000))
     bench = DriverBench([lamps, make_mapping('B3:99', plc='SLC', period=0)])
     bench.plc(1, 'SLC', ('B3:0', 100))
-    row, = bench.driver.interlocks.fallbacks
+    row, = bench.driver.kernel.rows.fallbacks
 
     def again(words: Words, ended: float) -> float:
         return 0.0 if row.is_under_way else math.inf
@@ -781,7 +782,7 @@ def test_rule_10_first_try_is_not_held_up_by_the_pause_of_another_row() -> None:
         cell.put_behind_gateway(run=7.0 + 0.1 * offset)
         for speed in speeds:
             cell.bench.write(speed, [5], run=0.1)
-        _, second = cell.bench.driver.interlocks.fallbacks
+        _, second = cell.bench.driver.kernel.rows.fallbacks
         cell.is_undelivered = lambda command: command.data[7:8] == b'\0'
         cell.bench.run_until(lambda row=second: row.sent > row.refreshed)
         assert second.sent < second.refreshed + second.after + 0.15
@@ -792,7 +793,7 @@ def test_rule_10_pause_of_this_process_is_no_pause_of_a_gateway() -> None:
     cell = Cell(speed, start=False)
     cell.put_behind_gateway(run=6.0)
     cell.publish(speed, 42, run=0.1)
-    row, = cell.bench.driver.interlocks.fallbacks
+    row, = cell.bench.driver.kernel.rows.fallbacks
     cell.is_undelivered = lambda command: True
     cell.bench.run_until(lambda: not row.stands and row.tried > row.refreshed
                          and not row.is_under_way)
@@ -831,8 +832,8 @@ def test_rule_11_first_tries_at_a_silent_plc_and_reads_take_turns_on_a_full_line
     line.run(0.3)
     line.far_stations[0].faults.silent = True
     line.run(2.0)
-    assert all(row.sent > row.refreshed for row in line.driver.interlocks.fallbacks)
-    first, second, _ = sorted(row.sent for row in line.driver.interlocks.fallbacks)
+    assert all(row.sent > row.refreshed for row in line.driver.kernel.rows.fallbacks)
+    first, second, _ = sorted(row.sent for row in line.driver.kernel.rows.fallbacks)
     assert any(first < when <= second for when in line.listener.times(read))
 
 
@@ -897,10 +898,10 @@ def test_rule_12_fallback_of_a_serve_row_goes_into_our_own_table(ours: int, thei
     assert cell.results() == [START, START, 'written', TIMEOUT]
     for row in (served, plain, other):
         cell.publish(row, 3, run=0.01)
-    cell.bench.driver.interlocks.forget_served()
+    cell.bench.driver.kernel.forget_served()
     assert words(served) + words(plain) + words(other) == b'\7\0\0\0\x08\0'
     cell.publish(other, 3, run=0.01)
-    cell.bench.driver.interlocks.end.wind_down()
+    cell.bench.driver.kernel.end.wind_down()
     cell.bench.line.wake(cell.bench.driver.machine)
     assert words(other) == b'\x08\0'  # at the end at once
 
@@ -921,4 +922,4 @@ def test_rule_17_fallback_has_one_result_and_its_retries_have_none() -> None:
 def test_rule_18_read_only_writes_nothing() -> None:
     cell = Cell(beat_row(), speed_row(), read_only=True, run=3.0)
     assert cell.writes == cell.bench.driver.readings.blocks == []
-    assert cell.bench.driver.interlocks.end.is_over
+    assert cell.bench.driver.kernel.end.is_over

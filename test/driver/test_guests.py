@@ -20,11 +20,11 @@ from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 from abdf1_ros.df1.packet import BROADCAST, Packet
-from abdf1_ros.driver.flights import Flight
 from abdf1_ros.driver.foreign_words import written_extents
 from abdf1_ros.driver.guest_rules import ShareAccess
 from abdf1_ros.driver.guests import Guest, GuestCommand, GuestListener
-from abdf1_ros.driver.interlocks.heartbeat import BeatState
+from abdf1_ros.driver.kernel.flights import Flight
+from abdf1_ros.driver.kernel.heartbeat import BeatState
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome, outcome_of
 from abdf1_ros.errors import CommandExpired, CommandTimeout, LinkError, PortLost, RemoteError
@@ -453,7 +453,7 @@ def test_failure_of_a_guest_says_nothing_about_the_station(
         program.ask(b'\0' + MARK, cmd=0x06)
         for _ in range(20):
             bench.run(0.1)
-            beats.add(bench.driver.interlocks.heartbeats[0].state)
+            beats.add(bench.driver.kernel.rows.heartbeats[0].state)
     station = bench.driver.stations[1]
     never_whole = where == 'say' and filtered is damaged  # it is polled for up to Cmd_Timeout
     assert program.statuses[0] in (

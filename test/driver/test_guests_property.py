@@ -22,7 +22,7 @@ from random import Random
 
 from abdf1_ros.df1.frames import EOT
 from abdf1_ros.driver.guest_rules import ShareAccess
-from abdf1_ros.driver.interlocks.heartbeat import BeatState
+from abdf1_ros.driver.kernel.heartbeat import BeatState
 from abdf1_ros.settings.network import Network
 import pytest
 from support.driver_bench import DriverBench, Program, READ_N7
@@ -58,7 +58,7 @@ def made(mode: str, polling: str) -> DriverBench:
         bench.open()
 
     def executor_runs() -> None:
-        bench.driver.interlocks.executor_ran(bench.clock())
+        bench.driver.kernel.executor_ran(bench.clock())
         bench.at(bench.clock() + 0.1, executor_runs)
 
     executor_runs()
@@ -97,7 +97,7 @@ def test_ours_have_their_time_and_no_guest_changes_what_we_know(mode: str, polli
         before, states = len(bench.listener.reads), set()
         for _ in range(round(SECONDS / 0.01)):  # so that programs ask again at once
             bench.run(0.01)
-            states.add(bench.driver.interlocks.heartbeats[0].state)
+            states.add(bench.driver.kernel.rows.heartbeats[0].state)
         reads, station = len(bench.listener.reads) - before, bench.driver.stations[1]
         case = f'{mode} {polling} {seed}'
         assert bench.listener.changes == [], case

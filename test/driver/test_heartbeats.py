@@ -22,7 +22,8 @@ import gc
 from random import Random
 
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.driver.interlocks.heartbeat import BeatState, LARGEST, OtherWriter
+from abdf1_ros.driver.kernel.heartbeat import BeatState, LARGEST, OtherWriter
+from abdf1_ros.driver.kernel.kernel import Rank
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome, Write
 from abdf1_ros.pccc.data_table import DataTable
@@ -51,7 +52,7 @@ def test_rule_2_first_contact_is_0_then_the_fallbacks_then_1(polling: str) -> No
 
 def test_rule_1_nothing_is_kept_of_beats_that_have_been_written() -> None:
     cell = Cell(beat_row(), speed_row(), run=2.0)
-    plc, = cell.bench.driver.interlocks.plcs.values()
+    plc, = cell.bench.driver.kernel.rows.plcs.values()
     before = len(gc.get_referrers(plc))
     cell.run(20.0)
     assert len(gc.get_referrers(plc)) <= before
@@ -59,7 +60,7 @@ def test_rule_1_nothing_is_kept_of_beats_that_have_been_written() -> None:
 
 def test_rule_1_counts_to_32767_and_begins_again_with_1() -> None:
     cell = Cell(beat_row(), run=1.0)
-    beat = cell.bench.driver.interlocks.heartbeats[0]
+    beat = cell.bench.driver.kernel.rows.heartbeats[0]
     assert beat.trial is not None
     beat.trial.write = Write(beat.mapping, [LARGEST - 1], cell.now, is_own=True)
     store(cell.plc, 'N10:0', [beat.value])
@@ -72,19 +73,19 @@ def test_rule_1_counts_to_32767_and_begins_again_with_1() -> None:
 def test_rule_2_the_0_of_a_first_contact_stands_for_a_period_and_half_a_second(
         period: int) -> None:
     cell = Cell(beat_row(period))
-    beat, = cell.bench.driver.interlocks.heartbeats
+    beat, = cell.bench.driver.kernel.rows.heartbeats
     assert beat.why_not(cell.now) == 'the PLC has not confirmed it yet'
     cell.run(2.0)
     zero, one = [when for when, _, value in cell.writes if value in (0, 1)]
     assert max(period / 1000, 0.5) < one - zero < max(period / 1000, 0.5) + 0.05
-    assert cell.bench.driver.interlocks.heartbeats[0].why_not(cell.now) == ''
+    assert cell.bench.driver.kernel.rows.heartbeats[0].why_not(cell.now) == ''
 
 
 def test_rule_3a_value_that_is_not_confirmed_is_repeated() -> None:
     cell = Cell(beat_row(), start=False)
     cell.refused = {'N10:0'}
     cell.bench.open(run=0.15)
-    beat, = cell.bench.driver.interlocks.heartbeats
+    beat, = cell.bench.driver.kernel.rows.heartbeats
     assert beat.why_not(cell.now).startswith('STS 10: ')
     cell.refused = set()
     cell.run(1.05)
@@ -117,7 +118,7 @@ def test_rule_3b_no_beat_while_a_fallback_is_not_confirmed() -> None:
     cell.run(2.0)
     assert cell.word('N7:0') == 7
     assert cell.word('N10:0') > 1
-    assert cell.bench.driver.interlocks.end.unconfirmed(cell.now)[1:] == [elsewhere.tag]
+    assert cell.bench.driver.kernel.end.unconfirmed(cell.now)[1:] == [elsewhere.tag]
 
 
 @pytest.mark.parametrize('polling', POLLING_MODES)
@@ -129,7 +130,7 @@ def test_rule_3c_hung_executor_stops_the_beat_where_it_is(polling: str) -> None:
     cell.run(5.0)
     assert last > 1
     assert (cell.word('N10:0'), len(cell.writes)) == (last, count)
-    assert cell.bench.driver.interlocks.heartbeats[0].why_not(cell.now) == \
+    assert cell.bench.driver.kernel.rows.heartbeats[0].why_not(cell.now) == \
         'the executor of the node stands still'
     cell.bench.is_alive = True
     cell.run(1.0)
@@ -139,13 +140,13 @@ def test_rule_3c_hung_executor_stops_the_beat_where_it_is(polling: str) -> None:
 def test_rule_3d_topic_that_falls_silent_is_0_at_once_though_the_executor_stands_still() -> None:
     speed = speed_row()
     cell = Cell(beat_row(200, ['speed', 'later'], 2000), speed)
-    cell.bench.driver.interlocks.conditions.messages['later'] = cell.now + 9.0
+    cell.bench.driver.kernel.rows.conditions.messages['later'] = cell.now + 9.0
     cell.run(2.0)
     lapses = cell.now + 2.0
     cell.publish(speed, 3, run=0.3)
     cell.bench.is_alive = False
     cell.run(lapses - cell.now - 0.01)
-    beat, = cell.bench.driver.interlocks.heartbeats
+    beat, = cell.bench.driver.kernel.rows.heartbeats
     assert cell.word('N10:0') and beat.reason == 'the executor of the node stands still'
     assert beat.look(cell.now, '') <= beat.topics_until == lapses  # or nothing would happen
     cell.run(0.05)
@@ -174,35 +175,35 @@ def test_rule_3_beat_is_not_sent_when_it_may_be_wrong_by_then() -> None:
     cell = Cell(beat_row(2000, requires=['speed'], timeout=5000), slow, speed)
     cell.publish(slow, 3, times=2)
     cell.publish(speed, 3, times=100, run=5.0)
-    interlocks, now = cell.bench.driver.interlocks, cell.now
-    beat = interlocks.heartbeats[0]
+    kernel, now = cell.bench.driver.kernel, cell.now
+    own = kernel.rows
+    beat = own.heartbeats[0]
 
     def expires(executor: float, message: float) -> float:
         """Return until when a beat may be sent that is due now."""
-        interlocks.executor_ran(executor)
-        interlocks.conditions.messages['speed'] = message
+        kernel.executor_ran(executor)
+        own.conditions.messages['speed'] = message
         assert beat.trial is not None
         beat.trial.begun = now - 2.0
-        interlocks.plcs[1].look_again(beat)
-        interlocks.beats_gave_way()
-        own = interlocks.next(now)
-        assert own is not None and not interlocks.conditions.is_beats_turn
-        assert own.write.mapping is beat.mapping
-        own.result = own.write.result(Outcome.NOT_SENT)
-        own.ended(None)
-        return own.expires
+        own.plcs[1].look_again(beat)
+        kernel.turns.beats_gave_way()
+        turn = kernel.next(now, Rank.OWN)
+        assert turn is not None and not own.conditions.is_beats_turn
+        assert turn.write.mapping is beat.mapping
+        kernel.ended(turn.flight, Outcome.NOT_SENT)
+        return turn.expires
 
     assert expires(now - 0.5, now) == now + 1.5  # of the executor
     assert expires(now, now - 4.0) == now + 1.0  # of the topic
     assert expires(now + 9.0, now + 9.0) == now + 3.0  # of the fallback: a message waits
-    interlocks.message_came(Write(speed, [3], now))  # an older one that came late
-    assert interlocks.conditions.messages['speed'] == now + 9.0
-    interlocks.conditions.messages['speed'] = now - 5.01
-    interlocks.message_came(Write(speed, [3], now - 0.02))  # published in time
+    own.message_came(Write(speed, [3], now), now)  # an older one that came late
+    assert own.conditions.messages['speed'] == now + 9.0
+    own.conditions.messages['speed'] = now - 5.01
+    own.message_came(Write(speed, [3], now - 0.02), now)  # published in time
     assert beat.state is BeatState.COUNTS
     beat.take(now)
-    interlocks.contact(1, now)
-    assert interlocks.next(now) is None  # the 0 waits for the end of the beat
+    kernel.station_changed(1, now, is_active=True)
+    assert kernel.next(now, Rank.OWN) is None  # the 0 waits for the end of the beat
 
 
 @pytest.mark.parametrize(('period', 'lost'), [(100, 0.0), (100, 0.35), (200, 0.2), (500, 0.2)])
@@ -210,7 +211,7 @@ def test_rule_3d_the_0_stands_for_half_a_second(period: int, lost: float) -> Non
     speed = speed_row(None)
     cell = Cell(beat_row(period, requires=(speed.topic,), timeout=600), speed)
     cell.publish(speed, 3, times=20, run=1.95)
-    beat, = cell.bench.driver.interlocks.heartbeats
+    beat, = cell.bench.driver.kernel.rows.heartbeats
     cell.bench.run_until(lambda: beat.state is BeatState.HELD)
     hear, since = cell.bench.far.hear, cell.now
     cell.bench.far.hear = lambda data: hear(data) if cell.now >= since + lost else b''
@@ -234,7 +235,7 @@ def test_rule_3d_lapse_that_nobody_saw_is_0_as_well() -> None:
     for number in range(40):
         line.at(0.1 * number, lambda: line.write(speed, [3]))
     line.run(4.88)
-    first, second = line.driver.interlocks.heartbeats
+    first, second = line.driver.kernel.rows.heartbeats
     line.far_stations[0].faults.silent = True
     before = second.value
     for number in range(12, 30):
@@ -272,18 +273,18 @@ def test_rule_3d_topic_that_comes_wakes_nobody_while_a_late_plc_has_to_wait() ->
     stations, driver = cell.bench.driver.stations, cell.bench.driver
     cell.bench.run_until(lambda: stations.next_own(1) > cell.now + 0.5)
     cell.publish(speed, 3, run=0.1)
-    assert driver.interlocks.heartbeats[0].state is BeatState.COUNTS
+    assert driver.kernel.rows.heartbeats[0].state is BeatState.COUNTS
     assert driver.next_task(cell.now) is None
     assert driver.next_due() > cell.now
-    driver.interlocks.beats_gave_way()
-    assert not driver.interlocks.is_beats_turn(cell.now)
+    driver.kernel.turns.beats_gave_way()
+    assert not driver.kernel.turns.is_beats_turn(cell.now)
 
 
 def test_rule_3d_message_that_a_fallback_has_overruled_does_not_count() -> None:
     speed = speed_row()
     cell = Cell(beat_row(requires=['speed'], timeout=5000), speed, run=2.0)
     assert set(cell.written('N10:0')) == {0}
-    cell.bench.driver.interlocks.fallbacks[0].sent = cell.now
+    cell.bench.driver.kernel.rows.fallbacks[0].sent = cell.now
     cell.bench.write(speed, [3], run=1.0)  # at the same moment
     assert cell.results()[-1] == 'not written: not sent: fallback'
     assert set(cell.written('N10:0')) == {0}
@@ -332,7 +333,7 @@ class Bridges:
         """Let time pass for those that run."""
         for _ in range(round(seconds / self._step)):
             for bench in self.running:
-                bench.driver.interlocks.executor_ran(bench.clock())
+                bench.driver.kernel.executor_ran(bench.clock())
                 bench.run(self._step)
 
     def store(self, value: int) -> None:
@@ -341,7 +342,7 @@ class Bridges:
 
     def states(self) -> list[BeatState]:
         """Return what each bridge makes of its row."""
-        return [bench.driver.interlocks.heartbeats[0].state for bench in self.benches]
+        return [bench.driver.kernel.rows.heartbeats[0].state for bench in self.benches]
 
     def told(self) -> list[bool]:
         """Return what the first has told: whether it was a conflict."""
@@ -367,7 +368,7 @@ def test_rule_19_two_bridges_end_with_0_and_say_who(
     for bench in cell.benches:
         assert [conflict for _, _, conflict in bench.listener.foreign] == [False, True]
         assert bench.listener.foreign[-1][1].startswith('another program writes this word: ')
-        assert bench.driver.interlocks.heartbeats[0].why_not(bench.clock())
+        assert bench.driver.kernel.rows.heartbeats[0].why_not(bench.clock())
     cell.running = cell.benches[1:]  # nobody takes over what the other leaves
     cell.run(10.0)
     assert cell.value == 0
@@ -394,7 +395,7 @@ def test_rule_19_second_foreign_value_stays_until_a_new_start(event: str) -> Non
     cell.run(100.0)
     cell.store(890)
     cell.run(5.0)
-    bench.driver.interlocks.contact(1, bench.clock())
+    bench.driver.kernel.station_changed(1, bench.clock(), is_active=True)
     cell.run(2.0)
     assert cell.value == 0
     if event == 'port':
@@ -402,7 +403,7 @@ def test_rule_19_second_foreign_value_stays_until_a_new_start(event: str) -> Non
         bench.open()
     else:
         for is_running in (False, True):
-            bench.driver.interlocks.mode_seen(1, is_running, bench.clock())
+            bench.driver.kernel.mode_seen(1, bench.clock(), is_running=is_running)
     cell.run(3.0)
     assert cell.value > 1
     assert cell.told() == [False, True]

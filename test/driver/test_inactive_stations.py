@@ -63,7 +63,7 @@ def test_output_of_a_plc_that_is_not_heard_does_not_flap_while_messages_come(mod
 def test_end_writes_once_to_a_plc_that_is_not_heard(
         mode: str, dies_after: float, is_behind: bool) -> None:
     death = with_broken_wire(mode, dies_after, is_behind=is_behind)
-    interlocks = death.driver.interlocks
+    interlocks = death.driver.kernel
     interlocks.end.wind_down()
     death.line.wake(death.driver.machine)
     death.run_until(lambda: interlocks.end.is_over or death.clock() > dies_after + 6.0)

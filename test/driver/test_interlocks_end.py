@@ -18,9 +18,9 @@ from dataclasses import replace
 import math
 
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.driver.interlocks.queue import Interlocks
+from abdf1_ros.driver.kernel.kernel import Kernel, Rank
 from abdf1_ros.driver.write import Write
-from abdf1_ros.driver.writes.under_way import WriteJob
+from abdf1_ros.driver.writes.jobs import WriteJob
 from abdf1_ros.settings.heartbeats import Fallback, LAST_ANSWER
 from abdf1_ros.settings.mapping import Mapping
 import pytest
@@ -51,14 +51,14 @@ def test_rule_5_orderly_end_is_0_then_the_fallbacks() -> None:
     cell.publish(speed, 3, times=20, run=1.95)
     since = cell.now
     driver = cell.bench.driver
-    assert not driver.interlocks.end.is_over
-    driver.interlocks.end.wind_down()
+    assert not driver.kernel.end.is_over
+    driver.kernel.end.wind_down()
     cell.bench.line.wake(driver.machine)
     cell.bench.write(speed, [4], run=0.3)
     assert [(name, value) for when, name, value in cell.writes if when >= since] == [
         ('N10:0', 0), ('N7:0', 7)]
-    assert driver.interlocks.end.is_over
-    assert driver.interlocks.end.unconfirmed(cell.now) == []
+    assert driver.kernel.end.is_over
+    assert driver.kernel.end.unconfirmed(cell.now) == []
     assert cell.results()[-2:] == ['not written: refused: this node ends', END]
 
 
@@ -68,7 +68,7 @@ def test_rule_5_message_does_not_outlive_the_end(moment: str) -> None:
     speed = speed_row()
     cell = Cell(beat_row(), speed, run=1.95)
     driver = cell.bench.driver
-    row, = driver.interlocks.fallbacks
+    row, = driver.kernel.rows.fallbacks
     if moment == 'after a fallback under way':
         cell.publish(speed, 3, run=0.1)
     if 'under way' in moment:
@@ -86,7 +86,7 @@ def test_rule_5_message_does_not_outlive_the_end(moment: str) -> None:
         assert cell.word('N7:0') == 7
     end(cell, 0.3)
     assert (cell.word('N10:0'), cell.word('N7:0')) == (0, 7)
-    assert driver.interlocks.end.unconfirmed(cell.now) == []
+    assert driver.kernel.end.unconfirmed(cell.now) == []
 
 
 @pytest.mark.parametrize('event', ['end', 'RUN', 'port'])
@@ -98,14 +98,14 @@ def test_rules_5_and_8_message_over_a_fallback_that_is_due_puts_none_off(event: 
     cell.run(0.3)  # refused once
     cell.is_late = True
     cell.bench.write(speed, [42])  # carried out, and nobody knows
-    cell.bench.run_until(lambda: cell.bench.driver.interlocks.fallbacks[0].has_failed)
+    cell.bench.run_until(lambda: cell.bench.driver.kernel.rows.fallbacks[0].has_failed)
     cell.is_late, cell.refused = False, set()
     assert cell.word('N7:0') == 42
     if event == 'end':
         end(cell)
     elif event == 'RUN':
         for is_running in (False, True):
-            cell.bench.driver.interlocks.mode_seen(1, is_running, cell.now)
+            cell.bench.driver.kernel.mode_seen(1, cell.now, is_running=is_running)
     else:
         cell.bench.lose_port()
         cell.bench.open()
@@ -165,7 +165,7 @@ def test_rule_5_end_asks_a_silent_plc_at_once_where_another_answers() -> None:
     cell.publish(speed, 42, times=20, run=1.95)
     cell.plc.faults.silent = True
     cell.bench.at(cell.now + 1.0, lambda: setattr(cell.plc.faults, 'silent', False))
-    cell.bench.driver.interlocks.end.wind_down()
+    cell.bench.driver.kernel.end.wind_down()
     cell.bench.line.wake(cell.bench.driver.machine)
     cell.run(1.5)
     assert (cell.word('N10:0'), cell.word('N7:0')) == (0, 7)
@@ -180,10 +180,10 @@ def test_rule_5_end_asks_a_silent_plc_too_where_another_has_its_own_rows() -> No
         line.write(row, [3], run=0.1)
     line.far_stations[0].faults.silent = True
     line.run(1.0)
-    line.driver.interlocks.end.wind_down()
+    line.driver.kernel.end.wind_down()
     line.line.wake(line.driver.machine)
-    line.run_until(lambda: line.driver.interlocks.end.is_over, 2.0)
-    assert line.driver.interlocks.end.unconfirmed(line.clock()) == ['speed1']
+    line.run_until(lambda: line.driver.kernel.end.is_over, 2.0)
+    assert line.driver.kernel.end.unconfirmed(line.clock()) == ['speed1']
 
 
 @pytest.mark.parametrize(('ends', 'is_silent', 'answer_within'), [
@@ -191,55 +191,56 @@ def test_rule_5_end_asks_a_silent_plc_too_where_another_has_its_own_rows() -> No
 def test_rule_5_last_try_at_a_silent_plc_is_short(
         ends: bool, is_silent: bool, answer_within: float) -> None:
     driver = Cell(speed_row(), start=False).bench.driver
-    driver.interlocks.begin(0.0)
+    driver.kernel.opened(0.0)
     if is_silent:
         driver.stations.lost(1, 0.0)
-    assert driver.interlocks.is_put_off(Write(driver.mappings[0], [3], 0.0)) is is_silent
+    assert driver.kernel.rows.is_put_off(Write(driver.mappings[0], [3], 0.0)) is is_silent
     if ends:
-        driver.interlocks.end.wind_down()
-    job = driver.interlocks.next(0.0)
+        driver.kernel.end.wind_down()
+    job = driver.kernel.next(0.0, Rank.OWN)
     assert job is not None and (job.is_free, job.answer_within) == (True, answer_within)
 
 
 def test_rule_5_silent_plc_is_not_due_at_the_end_while_another_has_not_answered() -> None:
     rows = speed_row(), make_mapping('N7:0', 'Write', station=2, fallback=FALLBACK)
     driver = Cell(*rows, start=False).bench.driver
-    driver.interlocks.begin(0.0)
+    driver.kernel.opened(0.0)
     driver.stations.lost(2, 0.0)
-    driver.interlocks.end.wind_down()
-    assert [job and job.station for job in map(driver.interlocks.next, (0.0, 0.0))] == [1, None]
-    assert driver.interlocks.next_due() == math.inf
+    driver.kernel.end.wind_down()
+    assert [turn and turn.flight.station for turn in (
+        driver.kernel.next(0.0, Rank.OWN), driver.kernel.next(0.0, Rank.OWN))] == [1, None]
+    assert driver.kernel.turns.next_due() == math.inf
 
 
 def test_rule_5_plc_that_has_just_left_a_command_unanswered_goes_last_at_the_end() -> None:
     """Two waits for it would take all the time of ~/polling and ~/reload."""
     rows = speed_row(), make_mapping('N7:0', 'Write', station=2, fallback=FALLBACK)
     driver = Cell(*rows, start=False).bench.driver
-    driver.interlocks.begin(0.0)
+    driver.kernel.opened(0.0)
     driver.stations[1].unanswered = 1
-    driver.interlocks.end.wind_down()
-    first = driver.interlocks.next(0.0)
-    assert first is not None and first.station == 2
+    driver.kernel.end.wind_down()
+    first = driver.kernel.next(0.0, Rank.OWN)
+    assert first is not None and first.flight.station == 2
 
 
 def test_rule_5_what_was_not_confirmed_at_the_end_is_named() -> None:
     cell = Cell(beat_row(), speed_row(), start=False)
-    assert cell.bench.driver.interlocks.end.unconfirmed(cell.now) == ['beat', 'speed']
+    assert cell.bench.driver.kernel.end.unconfirmed(cell.now) == ['beat', 'speed']
     cell.bench.open(run=1.0)
     cell.refused = {'N10:0'}
-    cell.bench.driver.interlocks.end.wind_down()
+    cell.bench.driver.kernel.end.wind_down()
     cell.bench.line.wake(cell.bench.driver.machine)
     cell.run(2.0)
-    assert not cell.bench.driver.interlocks.end.is_over
-    assert cell.bench.driver.interlocks.end.unconfirmed(cell.now) == ['beat']
+    assert not cell.bench.driver.kernel.end.is_over
+    assert cell.bench.driver.kernel.end.unconfirmed(cell.now) == ['beat']
 
 
-def begin_end(cell: Cell) -> Interlocks:
+def begin_end(cell: Cell) -> Kernel:
     """Begin an orderly end."""
     driver = cell.bench.driver
-    driver.interlocks.end.wind_down()
+    driver.kernel.end.wind_down()
     cell.bench.line.wake(driver.machine)
-    return driver.interlocks
+    return driver.kernel
 
 
 @pytest.mark.parametrize('beats', [(beat_row(),), ()])
@@ -254,7 +255,7 @@ def test_rule_5_end_waits_for_a_lost_port_and_writes_what_it_can_when_it_is_back
         interlocks = begin_end(cell)
     else:
         interlocks = begin_end(cell)
-        cell.bench.run_until(lambda: any(row.is_under_way for row in interlocks.fallbacks))
+        cell.bench.run_until(lambda: any(row.is_under_way for row in interlocks.rows.fallbacks))
         cell.bench.lose_port()
     tags = ['beat', 'speed'] if is_lost_first and beats else ['speed']
     assert interlocks.end.unconfirmed(cell.now) == tags
@@ -274,7 +275,7 @@ def test_rule_5_end_waits_for_a_lost_port_and_writes_what_it_can_when_it_is_back
 def test_rule_5_end_does_not_wait_for_a_lost_port_where_no_command_of_ours_may_stand() -> None:
     speed, other = speed_row(Fallback((7,), 20_000)), speed_row(tag='other', address='N10:5')
     cell = Cell(speed, other, start=False)
-    interlocks = cell.bench.driver.interlocks
+    interlocks = cell.bench.driver.kernel
     interlocks.end.wind_down()
     assert interlocks.end.unconfirmed(0.0) == ['speed', 'other']
     assert not interlocks.end.has_to_wait(is_open=False)  # nothing has gone out
@@ -294,9 +295,9 @@ def test_rule_5_end_does_not_wait_for_a_lost_port_where_no_command_of_ours_may_s
     assert not interlocks.end.has_to_wait(is_open=False, is_meant=lambda row: row is other)
     cell.bench.driver.take_over(cell.bench.driver)
     after = Cell(speed, other, start=False).bench.driver  # of new files, on the lost port
-    assert not after.interlocks.end.has_to_wait(is_open=False)
+    assert not after.kernel.end.has_to_wait(is_open=False)
     after.take_over(cell.bench.driver)
-    assert after.interlocks.end.has_to_wait(is_open=False)
+    assert after.kernel.end.has_to_wait(is_open=False)
 
 
 def test_rule_5_what_stands_is_written_once_more_at_the_end_after_all_else() -> None:
@@ -362,16 +363,16 @@ def test_rule_5_final_end_outlives_requests_and_new_files() -> None:
     cell = Cell(speed, start=False)
     cell.bench.open(run=1.0)
     cell.publish(speed, 42, run=0.1)
-    paused = cell.bench.driver.interlocks.end
+    paused = cell.bench.driver.kernel.end
     paused.wind_down()
     cell.bench.hand_over([speed])
-    assert not cell.bench.driver.interlocks.end.is_asked  # new files are a start
+    assert not cell.bench.driver.kernel.end.is_asked  # new files are a start
     cell.run(1.0)
-    final = cell.bench.driver.interlocks.end
+    final = cell.bench.driver.kernel.end
     final.wind_down(is_final=True)
     final.resume()
     assert final.is_asked
     cell.bench.hand_over([speed])
     cell.publish(speed, 43, run=1.0)
-    assert cell.bench.driver.interlocks.end.is_over
+    assert cell.bench.driver.kernel.end.is_over
     assert cell.word('N7:0') == 7

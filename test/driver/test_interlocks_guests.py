@@ -21,10 +21,10 @@ from itertools import count
 import math
 
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.driver.flights import Flight
 from abdf1_ros.driver.guest_rules import ShareAccess
 from abdf1_ros.driver.guests import Guest, GuestCommand
-from abdf1_ros.driver.interlocks.fallback import FallbackState
+from abdf1_ros.driver.kernel.fallback import FallbackState
+from abdf1_ros.driver.kernel.flights import Flight
 from abdf1_ros.driver.write import Outcome
 from abdf1_ros.settings.heartbeats import Fallback
 from abdf1_ros.settings.network import POLLING_MODES
@@ -82,7 +82,7 @@ def test_rule_5_what_may_still_land_after_the_end_is_named() -> None:
     cell.ask('N7:0', 99)
     cell.run(0.02)
     end(cell)
-    unconfirmed, = cell.bench.driver.interlocks.end.unconfirmed(cell.now)
+    unconfirmed, = cell.bench.driver.kernel.end.unconfirmed(cell.now)
     what, _, left = unconfirmed.partition(' for ')
     assert what == 'speed (a gateway may hold a write to it'
     assert 0.0 < float(left.removesuffix(' s)')) <= 20.0
@@ -111,7 +111,7 @@ def test_rule_10_gateway_that_shows_itself_after_the_port_was_opened_may_hold_an
 @pytest.mark.parametrize('dst', [1, 255])
 def test_rule_8_guests_write_over_a_fallback_is_written_over_at_once(dst: int) -> None:
     cell = GuestCell(beat_row(), speed_row())
-    row, = cell.bench.driver.interlocks.fallbacks
+    row, = cell.bench.driver.kernel.rows.fallbacks
     cell.run(1.0)
     since = cell.now
     cell.ask('N7:0', 99, dst)
@@ -143,7 +143,7 @@ def test_rule_19_own_heartbeats_that_a_gateway_holds_are_no_other_program(
     cell.run(5.0)
     assert left[0] < 0
     assert cell.bench.listener.foreign == []
-    assert cell.bench.driver.interlocks.heartbeats[0].why_not(cell.now) == ''
+    assert cell.bench.driver.kernel.rows.heartbeats[0].why_not(cell.now) == ''
 
 
 @pytest.mark.parametrize('has_speed', [True, False])  # in the new files
@@ -164,7 +164,7 @@ def test_rule_19_own_0_of_an_end_that_lands_after_a_reload_is_no_other_program(
         return is_zero and left[0] == 0
 
     hold(cell, 0.95, is_meant)
-    interlocks = cell.bench.driver.interlocks
+    interlocks = cell.bench.driver.kernel
     interlocks.end.wind_down()
     cell.bench.line.wake(cell.bench.driver.machine)
     while not interlocks.end.is_over:
@@ -184,7 +184,7 @@ def test_rule_2_plc_behind_a_gateway_that_answers_at_all_is_a_first_contact(
         outcome: Outcome) -> None:
     cell = Cell(make_mapping('N10:0', 'Heartbeat', tag='beat', period=200, via=7), start=False)
     cell.put_behind_gateway(run=3.0)
-    plc = cell.bench.driver.interlocks.plcs[1]
+    plc = cell.bench.driver.kernel.rows.plcs[1]
     beat, = plc.heartbeats
     assert not beat.wants_zero
     plc.failures = 1
@@ -264,7 +264,7 @@ def test_rule_5_commands_of_guests_are_not_sent_while_the_bridge_ends() -> None:
     cell = Cell(speed_row(), run=1.0)
     driver, sts = cell.bench.driver, []
     cell.refused = {'N7:0'}  # so that the end lasts
-    driver.interlocks.end.wind_down()
+    driver.kernel.end.wind_down()
     command = Packet(1, 9, 0x0F, 0, 1, bytes.fromhex('67 00 00 01 00 07 00 07 00 42 2A 00'))
     driver.guests.put(GuestCommand(Guest('pty:hmi', ShareAccess.ALL), command, cell.now,
                                    lambda reply: sts.append(reply.sts)))
@@ -277,7 +277,7 @@ def test_rule_11_plc_is_not_left_alone_any_more_once_it_answers_a_write_of_anybo
     cell = GuestCell(speed_row(), start=False)
     cell.is_undelivered = lambda command: command.data.endswith(b'\7\0')
     cell.bench.open()
-    plc = cell.bench.driver.interlocks.plcs[1]
+    plc = cell.bench.driver.kernel.rows.plcs[1]
     cell.bench.run_until(lambda: plc.is_lost)
     cell.is_undelivered = lambda command: False
     assert cell.now < 0.2 < plc.pause_end

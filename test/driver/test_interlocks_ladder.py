@@ -57,7 +57,7 @@ class Cell:
         self.bench.open()
 
     def _live(self) -> None:
-        self.bench.driver.interlocks.executor_ran(self.bench.clock())
+        self.bench.driver.kernel.executor_ran(self.bench.clock())
         if self.publishes:
             self.bench.write(self.speed, [self.ladder.is_on(Lamp.IN_CONTROL) and 7])
         self.bench.at(self.bench.clock() + 0.1, self._live)

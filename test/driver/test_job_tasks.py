@@ -146,6 +146,7 @@ def test_job_that_fails_before_its_first_command_has_ended_too() -> None:
         side_effect=ZeroDivisionError)
     with pytest.raises(ZeroDivisionError):
         bench.write(mapping, [1], run=1.0)
+    bench.lose_port('internal error')  # as the link's thread does
     assert bench.listener.outcomes() == [Outcome.UNKNOWN]
     assert not bench.driver.tasks.under_way
 

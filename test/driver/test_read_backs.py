@@ -19,7 +19,7 @@ import math
 
 from abdf1_ros.df1.frames import STX
 from abdf1_ros.df1.stations import ActiveStationList
-from abdf1_ros.driver.flights import Flights
+from abdf1_ros.driver.kernel.flights import Flights
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome, Write, WriteResult
 from abdf1_ros.errors import CommandTimeout, RemoteError
@@ -58,7 +58,7 @@ class Unconfirmed:
         write = Write(mapping, values, EARLY)
         lost = write.result(Outcome.UNKNOWN, 'lost', CommandTimeout())
         flight = self.flights.begin(mapping.station, [mapping.extent], write)
-        self.flights.tell(flight, lost, [self.block])
+        self.flights.tell(flight, lost, is_read=self.block.extent.holds(mapping.extent))
         self.flights.ended(flight, lost.outcome, lost.error)
 
     def read(self, data: bytes, started: float = EARLY) -> None:

@@ -17,7 +17,7 @@
 from collections.abc import Sequence
 import math
 
-from abdf1_ros.driver.interlocks.own import Crowd
+from abdf1_ros.driver.kernel.own import Crowd
 from abdf1_ros.settings.heartbeats import Fallback
 from abdf1_ros.settings.mapping import Mapping
 from support.cases import for_all
@@ -41,7 +41,7 @@ def single_row(address: str = 'N7:0', command: str = 'Write', station: int = 1, 
 def crowd(cell: Cell, until: float = math.inf, *, is_told: bool = True) -> None:
     """Let a second publisher come; it is alive until then."""
     bench = cell.bench
-    bench.driver.interlocks.crowd('speed', Crowd(WHY, until))
+    bench.driver.kernel.crowd('speed', Crowd(WHY, until))
     if is_told:
         bench.line.wake(bench.driver.machine)
 
@@ -152,7 +152,7 @@ def test_rule_28_holds_for_words_that_we_serve() -> None:
     bench = DriverBench([served])
     bench.run(0.1)
     bench.write(served, [3], run=0.1)
-    bench.driver.interlocks.crowd('speed', Crowd(WHY))
+    bench.driver.kernel.crowd('speed', Crowd(WHY))
     bench.write(served, [4], run=0.1)
     assert [str(result) for result in bench.listener.results] == [START, 'written', REFUSED, TWO]
     assert bench.driver.served.words_of(served) == b'\x07\0'
@@ -177,9 +177,9 @@ def test_rule_28_end_is_over_while_two_publish() -> None:
     speed = single_row()
     cell = Cell(speed, run=1.0)
     cell.bench.write(speed, [3], run=0.5)
-    cell.bench.driver.interlocks.end.wind_down()
+    cell.bench.driver.kernel.end.wind_down()
     crowd(cell)
     cell.run(0.3)
-    assert cell.bench.driver.interlocks.end.is_over
+    assert cell.bench.driver.kernel.end.is_over
     assert cell.results()[2:] == [END]
     assert cell.word('N7:0') == 7

@@ -21,7 +21,7 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave
 from abdf1_ros.df1.stations import ActiveStationList
-from abdf1_ros.driver.flights import Flight, Flights
+from abdf1_ros.driver.kernel.flights import Flight, Flights
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome, Write
 from abdf1_ros.pccc.emulated import Setting

@@ -295,7 +295,7 @@ def test_rule_5_orderly_end_has_the_time_that_is_printed(stands: bool) -> None:
             bench.write(row, [42], 0.2)
     for plc in plcs if stands else ():
         store(plc, 'N7:0', [42] * 5)  # by another program
-    begun, interlocks = bench.line.now, bench.driver.interlocks
+    begun, interlocks = bench.line.now, bench.driver.kernel
     interlocks.end.wind_down()
     bench.line.wake(bench.driver.machine)
     bench.run_until(lambda: interlocks.end.is_over, LONGEST_END)
@@ -327,7 +327,7 @@ def test_rules_5_and_16_end_where_no_plc_answers_has_the_time_that_is_printed(
     hear, heard = bench.far.hear, bytearray()
     bench.far.hear = lambda data: (heard.extend(data), hear(data))[1]
     bench.far.say = lambda data: b''
-    interlocks = bench.driver.interlocks
+    interlocks = bench.driver.kernel
     bench.run_until(lambda: not any(
         bench.driver.stations[number].active for number in numbers), 20.0)
     printed = Times(network, Rows(rows)).end_in_silence

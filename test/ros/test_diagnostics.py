@@ -32,11 +32,11 @@ from abdf1_ros.df1.slave_link import SlaveLink
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.checks import StationHealth
 from abdf1_ros.driver.driver import Driver
-from abdf1_ros.driver.flights import Flight
 from abdf1_ros.driver.guests import Guest
-from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackRow
-from abdf1_ros.driver.interlocks.heartbeat import HeartbeatRow
-from abdf1_ros.driver.interlocks.plc import OwnRow
+from abdf1_ros.driver.kernel.fallback import FallbackCause, FallbackRow
+from abdf1_ros.driver.kernel.flights import Flight
+from abdf1_ros.driver.kernel.heartbeat import HeartbeatRow
+from abdf1_ros.driver.kernel.plc import OwnRow
 from abdf1_ros.driver.overheard import Carried
 from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.driver.settings import DriverSettings
@@ -922,7 +922,7 @@ def test_heartbeat_that_the_plc_does_not_confirm_does_not_count(make_bench: Benc
     bench = make_bench('alive,Heartbeat,N10:0,1,PLC5,500')
     assert bench.says('interlocks')[1] == (
         'WARN: 0 of 1 heartbeats count; alive: heartbeat does not count')
-    beat = bench.driver.interlocks.heartbeats[0]
+    beat = bench.driver.kernel.rows.heartbeats[0]
     confirm(beat, 1)
     assert bench.says('interlocks', NOW) == (OK, 'OK: 1 of 1 heartbeats count')
     values = bench.details('interlocks', NOW + 1.5)
@@ -938,7 +938,7 @@ def test_heartbeat_that_the_plc_does_not_confirm_does_not_count(make_bench: Benc
 @pytest.mark.parametrize('text', ['the port was lost: No such device', RELEASED])
 def test_no_heartbeat_counts_while_the_port_is_closed(make_bench: Benches, text: str) -> None:
     bench = make_bench('alive,Heartbeat,N10:0,1,PLC5,500')
-    beat = bench.driver.interlocks.heartbeats[0]
+    beat = bench.driver.kernel.rows.heartbeats[0]
     confirm(beat, 1)
     assert bench.says('interlocks', NOW + 0.1) == (OK, 'OK: 1 of 1 heartbeats count')
     bench.set_port(False, text)
@@ -955,7 +955,7 @@ def test_bit_of_the_plc_confirms_control_while_it_is_fresh_and_1(
         make_bench: Benches, monkeypatch: pytest.MonkeyPatch) -> None:
     bench = make_bench('alive,Heartbeat,N10:0,1,PLC5,60000,,8',
                        'ruled,Read,B12:0/2,1,PLC5,1000,alive,8', header=f'{HEADER},Confirms,Via')
-    beat, bit = bench.driver.interlocks.heartbeats[0], bench.point('ruled')
+    beat, bit = bench.driver.kernel.rows.heartbeats[0], bench.point('ruled')
     latest: dict[str, Values] = {}
     bench.seen.latest = latest
 
@@ -1026,7 +1026,7 @@ def test_value_of_a_guest_over_a_fallback_is_a_warning(
     assert line(mode='Slave').details('interlocks') == {
         'speed': 'a message stands', 'bound of speed': 'none: the master of the line decides'}
     bench = line()
-    row, = bench.driver.interlocks.fallbacks
+    row, = bench.driver.kernel.rows.fallbacks
     confirm(row, 7)
     assert bench.says('interlocks')[0] == OK
     guest = Flight(1, [row.mapping.extent])
@@ -1052,7 +1052,7 @@ def test_value_of_a_guest_over_a_fallback_is_a_warning(
 
 def test_station_is_told_by_the_worst_of_its_heartbeats(make_bench: Benches) -> None:
     bench = make_bench(*(f'beat_{word},Heartbeat,N10:{word},1,PLC5,1000' for word in range(3)))
-    beats = bench.driver.interlocks.heartbeats
+    beats = bench.driver.kernel.rows.heartbeats
     for beat in beats[::2]:
         confirm(beat, 1)
     assert bench.details('interlocks')['station 1'].startswith('not in control: ')
@@ -1064,7 +1064,7 @@ def test_heartbeat_that_another_program_writes_is_an_error_with_what_it_wrote(
         make_bench: Benches) -> None:
     bench = make_bench('alive,Heartbeat,N10:0,1,PLC5,500,', 'other,Heartbeat,N10:1,2,PLC5,500,',
                        'ruled,Read,B12:0/2,2,PLC5,1000,other', header=f'{HEADER},Confirms')
-    beat, other = bench.driver.interlocks.heartbeats
+    beat, other = bench.driver.kernel.rows.heartbeats
     confirm(beat, 0)
     beat.is_taken = True
     confirm(other, 1)

@@ -26,7 +26,7 @@ import threading
 import time
 from typing import Any
 
-from abdf1_ros.driver.writes import queue
+from abdf1_ros.driver.kernel import waiting
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.ports.link_thread import PortState
@@ -139,7 +139,7 @@ def test_each_mapping_of_a_topic_has_a_result_of_its_own(make_bench: Benches) ->
 
 def test_every_pulse_of_a_burst_is_sent_in_order(
         make_bench: Benches, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(queue, 'CARRIED_WITHIN', 15.0)  # the host may stand still
+    monkeypatch.setattr(waiting, 'CARRIED_WITHIN', 15.0)  # the host may stand still
     bench = make_bench(PULSES, SPEED)
     speed = bench.ros.listen(msg.Int16MultiArray, '/abdf1/read/speed')
     publish = bench.publisher(msg.UInt8MultiArray, 'pulses')
@@ -183,7 +183,7 @@ def test_results_of_all_writes_that_wait_fit_into_their_queue(make_bench: Benche
     node = make_bench(PULSES).node
     depths = {each.topic_name: each.qos_profile.depth for each in node.publishers}
     assert depths['/abdf1/write_results'] == node.surroundings.results.waiting.maxlen == \
-        queue.MAX_WAITING_WRITES
+        waiting.MAX_WAITING_WRITES
 
 
 def test_station_with_another_error_code_is_told_once(make_bench: Benches, capfd: Output) -> None:
@@ -345,9 +345,9 @@ def test_bytes_that_come_are_judged_anew_at_each_opening_of_the_port(
 def test_end_is_not_taken_back_by_a_request(
         make_bench: Benches, monkeypatch: pytest.MonkeyPatch, capfd: Output) -> None:
     bench = make_bench(SPEED)
-    session, resume = bench.node.session, bench.node.session.driver.interlocks.end.resume
+    session, resume = bench.node.session, bench.node.session.driver.kernel.end.resume
     session.events.unreadable(session.driver.mappings[0], 'no such file')
-    monkeypatch.setattr(session.driver.interlocks.end, 'resume',
+    monkeypatch.setattr(session.driver.kernel.end, 'resume',
                         lambda: (bench.node.begin_end(), resume()))  # it ends meanwhile
     bench.node.set_polling(SetBool.Request(data=True), SetBool.Response())
     assert 'no such file' in capfd.readouterr().err
@@ -355,7 +355,7 @@ def test_end_is_not_taken_back_by_a_request(
     assert (polling.success, polling.message) == (False, 'this node ends')
     reload = bench.call(Trigger, 'reload', Trigger.Request())
     assert (reload.success, reload.message) == (False, 'this node ends')
-    assert session.driver.interlocks.end.is_asked
+    assert session.driver.kernel.end.is_asked
     assert not bench.node.hand_over(session.configuration)
     assert bench.node.session is session
 

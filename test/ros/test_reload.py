@@ -286,7 +286,7 @@ def test_signal_that_comes_during_a_reload_is_no_failure(
         bench.node.begin_end(), step == 'BridgeSession' and BridgeSession(*made))[1])
     is_done, text = bench.reload()
     assert (is_done, text != 'this node ends') == (step == 'BridgeSession',) * 2
-    assert bench.node.session.driver.interlocks.end.is_asked
+    assert bench.node.session.driver.kernel.end.is_asked
     monkeypatch.undo()
     bench.end()
     assert not (place.is_symlink() or bench.node.has_failed)

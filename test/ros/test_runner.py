@@ -208,7 +208,7 @@ def test_end_waits_for_a_port_that_was_lost_unless_it_was_left_or_is_of_a_spare(
     link.state.is_open = is_open
     session: Any = Mock(is_waiting=False, _surroundings=Mock(link=link))
     session.configuration.parameters.standby = is_spare
-    interlocks = session.driver.interlocks
+    interlocks = session.driver.kernel
     interlocks.end.has_to_wait.return_value = True
     assert BridgeSession.has_to_wait(session, bool) is waits
     end = interlocks.end

@@ -23,9 +23,9 @@ from unittest.mock import Mock
 from abdf1_ros.cli.sniff import main as sniff
 from abdf1_ros.client import Client
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.driver.flights import Flight
 from abdf1_ros.driver.guest_rules import ShareAccess
 from abdf1_ros.driver.guests import Guest, GuestCommand
+from abdf1_ros.driver.kernel.flights import Flight
 from abdf1_ros.errors import RemoteError
 from abdf1_ros.ros.bridge.guests import GuestPlaces
 from abdf1_ros.settings.mapping import Mapping

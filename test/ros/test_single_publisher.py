@@ -22,7 +22,7 @@ import time
 from types import SimpleNamespace
 from typing import cast
 
-from abdf1_ros.driver.interlocks.own import Crowd
+from abdf1_ros.driver.kernel.own import Crowd
 from abdf1_ros.ros.diagnostics.graph import UNKNOWN_NODE
 from abdf1_ros.ros.topics.interlocks import InterlockWatch
 from abdf1_ros.ros.topics.publishers import LivingPublishers
@@ -162,7 +162,7 @@ def test_rule_28_log_has_the_names_when_they_are_known_and_rule_17_says_nothing(
     rows = [make_mapping(f'N7:{number}', 'Write', tag=tag, fallback=Fallback((7,), 1000),
                          single_publisher=tag == 'speed')
             for number, tag in enumerate(('speed', 'other'))]
-    graph, interlocks = Graph(), (driver := DriverBench(rows, start=False).driver).interlocks
+    graph, interlocks = Graph(), (driver := DriverBench(rows, start=False).driver).kernel
     watch = InterlockWatch(cast(Node, graph), driver)
     assert (watch.look(0.0), watch.refusing(0.0)) == (('other',), {})
     interlocks.crowd('speed', Crowd('two'))

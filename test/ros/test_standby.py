@@ -224,7 +224,7 @@ def test_line_of_a_device_server_is_ours_when_any_station_has_answered_since_it_
             ('info', True), ('error', False), ('info', True), ('info', False))]
     around.link.wake.reset_mock()
     session.begin_end()
-    session.driver.interlocks.end.wind_down.assert_called_once_with(is_final=False)
+    session.driver.kernel.end.wind_down.assert_called_once_with(is_final=False)
     session.go_on()
     for opened in around.services.open, around.writes.open:
         opened.call_args.args[3]()
@@ -234,7 +234,7 @@ def test_line_of_a_device_server_is_ours_when_any_station_has_answered_since_it_
     session.go_on()
     around.services.open.assert_called_once()
     assert not latest and not around.results.waiting
-    assert session.driver.interlocks.forget_served.called is has_line
+    assert session.driver.kernel.forget_served.called is has_line
 
 
 def test_change_that_waits_for_the_executor_is_not_begun_again_before_it_ends() -> None:

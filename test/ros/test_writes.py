@@ -22,7 +22,7 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 from abdf1_ros.driver.driver import Driver
-from abdf1_ros.driver.interlocks.own import Crowd
+from abdf1_ros.driver.kernel.own import Crowd
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ros.callbacks import AnsweringNode
 from abdf1_ros.ros.diagnostics.graph import UNKNOWN_NODE
@@ -69,7 +69,7 @@ class Taker:
         self.kinds: dict[str, type] = {}
         self.wakes: list[int] = []
         self.events: Any = None  # of a topic with Single_Publisher
-        self.interlocks, self.panel = self, 'panel_{}'
+        self.kernel, self.panel = self, 'panel_{}'
 
     def create_subscription(self, kind: Any, name: str, callback: Any, qos: Any,
                             event_callbacks: Any = None) -> str:

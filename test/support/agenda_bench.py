@@ -25,19 +25,18 @@ from abdf1_ros.df1.machine import LineTiming
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.agenda import Agenda
 from abdf1_ros.driver.checks import Checks
-from abdf1_ros.driver.flights import Flight, Flights
 from abdf1_ros.driver.guest_rules import GuestRules
 from abdf1_ros.driver.guests import GuestQueue
-from abdf1_ros.driver.interlocks.queue import Interlocks
 from abdf1_ros.driver.job_tasks import JobTasks
+from abdf1_ros.driver.kernel.flights import Flight, Flights
+from abdf1_ros.driver.kernel.kernel import Kernel, Rank, Turn
 from abdf1_ros.driver.reads.job import ReadJob
 from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.driver.reads.readings import Readings
 from abdf1_ros.driver.served import Served
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome, Write, WriteResult
-from abdf1_ros.driver.writes.queue import WriteQueue
-from abdf1_ros.driver.writes.under_way import WriteJob, WritesUnderWay
+from abdf1_ros.driver.writes.jobs import WriteJob, WritesUnderWay
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.plan.line_model import LineModel
 from abdf1_ros.plan.planner import Planner
@@ -71,28 +70,25 @@ class Bench:
     """An agenda without checks, whose jobs are done by hand."""
 
     def __init__(self, *jobs: ReadJob, write_timeout: float = 2.0) -> None:
-        self.results: list[WriteResult] = []
-        self.begun: dict[Write, WriteJob] = {}
+        self.begun: dict[Write, Turn] = {}
         self.stations = ActiveStationList([job.station for job in jobs], probe_time=PROBE_TIME)
         self.tasks = JobTasks(5, 0, line := StillClock())
         listener = Recorder(lambda: 0.0)
-        self.flights = Flights(line, 1.0, self.stations, write_timeout, self.results.append)
+        served = Served(PlcType.PLC5, Rows(), lambda mapping, words: None)
+        self.kernel = Kernel(Rows(), Rows(), self.stations, line, self.tasks, served,
+                             settle_time=1.0, patience=write_timeout, tx_delay=0.25)
+        self.results = self.kernel.out
         readings = Readings(Network(), Rows(), DriverSettings(), self.stations, line, listener,
-                            self.flights)
-        writing = WritesUnderWay(self.stations, self.flights, readings)
-        self.reads = readings.reads
-        self.writes = WriteQueue(self.stations, writing, write_timeout, self.results.append,
-                                 lambda write, now: '', tx_delay=0.25)
+                            self.kernel)
+        writing = WritesUnderWay(self.stations, line, self.kernel, readings)
+        self.reads, self.waiting = readings.reads, self.kernel.waiting
         checks = Checks(self.stations, {job.station for job in jobs}, 0.0, line,
                         readings.link_failed, lambda station, identity, asked: None)
         checks.begin(0.0)
-        served = Served(PlcType.PLC5, Rows(), readings.served)
-        interlocks = Interlocks(Rows(), self.writes, writing, served, listener,
-                                lambda mapping, text, is_conflict: None)
         rules = GuestRules(Network(), Rows(), lambda station: None)
-        guests = GuestQueue(self.stations, line, 1.0, rules, self.flights)
+        guests = GuestQueue(self.stations, line, 1.0, rules, writing)
         self.agenda = Agenda(
-            self.stations, interlocks, self.writes, checks, self.reads, guests, self.tasks)
+            self.stations, self.kernel, writing, checks, self.reads, guests, self.tasks)
         self.reads.replace((), jobs, 0.0)
 
     def next(self, now: float) -> object:  # noqa: A003
@@ -103,16 +99,16 @@ class Bench:
         self.end(job)
         return job.write
 
-    def end(self, job: WriteJob) -> None:
+    def end(self, turn: Turn | WriteJob) -> None:
         """Let a write end unsent."""
-        self.flights.ended(job.flight, Outcome.NOT_SENT)
+        self.kernel.ended(turn.flight, Outcome.NOT_SENT)
 
     def begin_write(self, now: float, busy: Container[int] = ()) -> Write | None:
         """Take the next write, which is under way from then on."""
-        job = self.writes.next(now, busy)
-        if job is not None:
-            self.begun[job.write] = job
-        return job.write if job is not None else None
+        turn = self.kernel.next(now, Rank.MESSAGE, busy)
+        if turn is not None:
+            self.begun[turn.write] = turn
+        return turn.write if turn is not None else None
 
     def next_write(self, now: float) -> Write | None:
         """Take the next write, which ends at once."""
@@ -145,7 +141,7 @@ class Bench:
         return write
 
     def add(self, write: Write) -> None:
-        self.writes.add(write, write.requested)
+        self.waiting.add(write, write.requested)
 
     def outcomes(self) -> list[Outcome]:
-        return [result.outcome for result in self.results]
+        return [result.outcome for result in self.results if isinstance(result, WriteResult)]

@@ -262,7 +262,7 @@ class DriverBench:
     def breathe(self) -> None:
         """Let the executor run ten times a second from now on, while it ``is_alive``."""
         if self.is_alive:
-            self.driver.interlocks.executor_ran(self.line.now)
+            self.driver.kernel.executor_ran(self.line.now)
         self.at(self.line.now + 0.1, self.breathe)
 
     def lose_port(self, reason: str = 'unplugged') -> None:

@@ -185,13 +185,13 @@ def speed_cell() -> tuple[Cell, Mapping]:
 def end(cell: Cell, seconds: float = 2.0) -> None:
     """End in order: within so many seconds all has to be confirmed, and then the port closes."""
     driver = cell.bench.driver
-    driver.interlocks.end.wind_down()
+    driver.kernel.end.wind_down()
     cell.bench.line.wake(driver.machine)
     give_up = cell.now + seconds
-    while not driver.interlocks.end.is_over:
+    while not driver.kernel.end.is_over:
         assert cell.now < give_up
         cell.run(0.005)
-    assert not any(row.is_under_way for plc in driver.interlocks.plcs.values() for row in plc.rows)
+    assert not any(row.is_under_way for row in driver.kernel.rows.plc_of)
     cell.bench.lose_port()
     cell.run(2.0)
 

@@ -21,10 +21,10 @@ import math
 from random import Random
 
 from abdf1_ros.df1.stations import ActiveStationList
-from abdf1_ros.driver.flights import Flight, Flights
-from abdf1_ros.driver.interlocks.fallback import FallbackRow
-from abdf1_ros.driver.interlocks.heartbeat import HeartbeatRow
-from abdf1_ros.driver.interlocks.own import Conditions
+from abdf1_ros.driver.kernel.fallback import FallbackRow
+from abdf1_ros.driver.kernel.flights import Flight, Flights
+from abdf1_ros.driver.kernel.heartbeat import HeartbeatRow
+from abdf1_ros.driver.kernel.own import Conditions
 from abdf1_ros.driver.write import Outcome, Write
 from abdf1_ros.errors import CommandTimeout
 from support.clock import StillClock
@@ -58,7 +58,8 @@ class OneRow(StillClock):
         trial = self.row.trial
         self._end(trial if trial is not None and trial.write is write else self.begin(write),
                   done, outcome)
-        return self.row.ended(outcome, done)
+        confirmed = self.row.ended(outcome, done)
+        return confirmed and confirmed.seconds
 
     def guest(self, now: float) -> None:
         self.now = now

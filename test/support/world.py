@@ -54,7 +54,7 @@ from abdf1_ros.df1.slave import HalfDuplexSlave
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.guest_rules import ShareAccess
 from abdf1_ros.driver.guests import Guest, GuestCommand
-from abdf1_ros.driver.interlocks.own import Crowd
+from abdf1_ros.driver.kernel.own import Crowd
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import WriteResult
 from abdf1_ros.errors import FormatError, LinkError, PortLost
@@ -804,7 +804,7 @@ class World(DriverBench):
             self.clocks.look(self.line.now)
         if self.is_alive and self.line.now >= self.away:
             self.executor_ran = self.line.now
-            self.driver.interlocks.executor_ran(self.line.now)
+            self.driver.kernel.executor_ran(self.line.now)
 
     # What people and programs do
 
@@ -876,7 +876,7 @@ class World(DriverBench):
 
     def _set_crowd(self, tag: str, until: float) -> None:
         crowd = Crowd('more than one publisher', until)
-        self.driver.interlocks.crowd(self.rows[tag].topic, crowd)
+        self.driver.kernel.crowd(self.rows[tag].topic, crowd)
 
     def ask(self, station: int, text: str) -> None:
         """Let a guest write a value of its own to a word, of all stations, or what none knows."""
@@ -1061,7 +1061,7 @@ class World(DriverBench):
 
     def wind_down(self, limit: float = LONGEST_END) -> None:
         """Write what an end writes, and wait for it, as the node does (rule 5)."""
-        interlocks = self.driver.interlocks
+        interlocks = self.driver.kernel
         self.ended = self.line.now
         interlocks.end.wind_down()
         self.line.wake(self.driver.machine)
@@ -1155,5 +1155,5 @@ class OtherBridge(DriverBench):
         self.open()
 
     def _breathe(self) -> None:
-        self.driver.interlocks.executor_ran(self.clock())
+        self.driver.kernel.executor_ran(self.clock())
         self.at(self.clock() + STEP, self._breathe)

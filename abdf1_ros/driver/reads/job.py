@@ -23,7 +23,8 @@ from typing import NamedTuple
 
 from abdf1_ros.df1.machine import MOST_LATE
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.driver.job_tasks import Job, LineTime
+from abdf1_ros.df1.tasks import LineTime
+from abdf1_ros.driver.job_tasks import Job
 from abdf1_ros.driver.reads.point import ReadPoint, SMOOTHING
 from abdf1_ros.errors import Abdf1Error
 from abdf1_ros.pccc.dialect import Request, Steps

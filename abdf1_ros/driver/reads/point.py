@@ -148,7 +148,9 @@ class ReadPoint:
             self.guard.withheld.discard(self)
         self.raw = values  # before its time, which other threads look at first
         self.last_good, self.error, self.withheld = now, None, ''
-        return None if is_same else self._published(values)
+        if is_same:
+            return None
+        return values if self._scaling is None else self._published(values)
 
     def forget_published(self) -> None:
         """Publish the next value even if it has not changed: the topic may be a new one."""

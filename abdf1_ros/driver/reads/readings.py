@@ -22,8 +22,8 @@ import math
 from typing import Protocol
 
 from abdf1_ros.df1.stations import ActiveStationList
-from abdf1_ros.driver.flights import Flights
-from abdf1_ros.driver.job_tasks import LineTime
+from abdf1_ros.df1.tasks import LineTime
+from abdf1_ros.driver.kernel.kernel import Kernel
 from abdf1_ros.driver.reads.demands import ReadAnswer, ReadCall, ReadCalls
 from abdf1_ros.driver.reads.guards import Guards
 from abdf1_ros.driver.reads.job import ReadJob, ReadTooOld
@@ -85,14 +85,14 @@ class Readings:
     """
     The ``points`` of all rows that are published, and the ``reads`` that serve them.
 
-    ``listener`` gets the values, ``flights`` all words. ``planner`` knows the packets that each
+    ``listener`` gets the values, ``kernel`` all words. ``planner`` knows the packets that each
     station accepts. ``mode_periods`` has the stations that have to be asked for their mode, with
     the period (s).
     """
 
     def __init__(self, network: Network, mappings: Rows, settings: DriverSettings,
                  stations: ActiveStationList, line: LineTime, listener: ValueListener,
-                 flights: Flights) -> None:
+                 kernel: Kernel) -> None:
         self.planner = Planner(line_model(network), settings.default_period)
         blocks = self.planner.plan(mappings.repeated)
         self._longest_frames = max((max(block.line_times) for block in blocks), default=0.0)
@@ -110,7 +110,7 @@ class Readings:
         self._stations = stations
         self._line = line
         self._listener = listener
-        self._flights = flights
+        self._kernel = kernel
         self._refusals = Refusals(self.planner)
         self.reads.replace((), map(self._job, blocks), 0.0)
 
@@ -124,6 +124,10 @@ class Readings:
     def blocks(self) -> list[Block]:
         """Return the blocks that are read again and again."""
         return [job.block for job in self.reads.jobs if not job.is_on_demand]
+
+    def are_read(self, row: Mapping) -> bool:
+        """Tell whether one of the blocks has all words of a row."""
+        return any(block.extent.holds(row.extent) for block in self.blocks)
 
     def _job(self, block: Block) -> ReadJob:
         mode, line = self._network.line_mode, self._network.line
@@ -200,8 +204,7 @@ class Readings:
     def _read(self, job: ReadJob, data: bytes) -> None:
         """Update the points for which this read was made."""
         now = self._line.now
-        for reader in self._flights.readers:
-            reader.words_read(job.block, data, job.started)
+        self._kernel.read(job.block, data, job.started)
         if self.guards.counters:
             for point, place in job.points.items():
                 self.guards.value_read(point, data[place], now)

@@ -31,13 +31,13 @@ from collections.abc import Container, Iterable, Set
 import math
 
 from abdf1_ros.df1.stations import ActiveStationList
-from abdf1_ros.driver.flights import Flight, WriteListener
+from abdf1_ros.driver.kernel.flights import Flight
 from abdf1_ros.driver.reads.job import ReadJob
 from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.driver.reads.queue import ReadQueue
 
 
-class Reads(WriteListener):
+class Reads:
     """
     Keep all read jobs; ``stations.probes`` decides when a silent station may be read.
 

@@ -12,9 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""
-Messages on their way to a PLC: the queue, the packets, and the end of each.
-
-``queue`` has the messages that wait for the line, ``under_way`` the writes that have it,
-``packets`` the commands of one write, ``reasons`` why a message is not taken.
-"""
+"""Writes that have the line: ``jobs`` has their begin and their end, ``packets`` their sending."""

@@ -21,9 +21,9 @@ from dataclasses import replace
 
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.driver import Driver
-from abdf1_ros.driver.flights import Flight
 from abdf1_ros.driver.guest_rules import ShareAccess
 from abdf1_ros.driver.guests import Guest, GuestListener
+from abdf1_ros.driver.kernel.flights import Flight
 from abdf1_ros.pccc.describe import command_name, describe
 from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.ros.diagnostics.log import LimitedLog

@@ -26,7 +26,7 @@ import time
 from typing import Unpack
 
 from abdf1_ros.driver.driver import ENDS
-from abdf1_ros.driver.writes.queue import MAX_WAITING_WRITES
+from abdf1_ros.driver.kernel.waiting import MAX_WAITING_WRITES
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.link_thread import LinkThread, PortState
 from abdf1_ros.ports.settings import Lack, PortSettings
@@ -287,7 +287,7 @@ class BridgeNode(AnsweringNode):
         if self.session.is_ending:
             response.message = ENDS
         elif request.data:
-            self.session.driver.interlocks.end.resume()
+            self.session.driver.kernel.end.resume()
             self.link.take()
             response.success, response.message = True, f'{self.session.port} is being opened'
         else:

@@ -249,12 +249,12 @@ class BridgeSession:
     @property
     def is_ending(self) -> bool:
         """Return True if the bridge ends for good."""
-        return self.driver.interlocks.end.is_final
+        return self.driver.kernel.end.is_final
 
     def begin_end(self, *, is_final: bool = False) -> None:
         """Begin to set heartbeats to 0 and write fallbacks (rule 5); ``tell_plcs`` waits."""
         self.events.unreadable_rows.tell()
-        self.driver.interlocks.end.wind_down(is_final=is_final)
+        self.driver.kernel.end.wind_down(is_final=is_final)
         self._wake_link()
 
     def has_to_wait(self, is_meant: Callable[[Mapping], bool]) -> bool:
@@ -268,7 +268,7 @@ class BridgeSession:
         is_open = link.state.is_open
         is_gone = link.is_released or self.configuration.parameters.standby
         return link.is_alive() and (is_open or not is_gone) \
-            and self.driver.interlocks.end.has_to_wait(is_open=is_open, is_meant=is_meant)
+            and self.driver.kernel.end.has_to_wait(is_open=is_open, is_meant=is_meant)
 
     def tell_unconfirmed(self, what: str) -> list[str]:
         """
@@ -280,11 +280,11 @@ class BridgeSession:
         has_line = self._surroundings.link.state.is_open
         if self.is_waiting or self.configuration.parameters.standby and not has_line:
             return []
-        interlocks, notes, told = self.driver.interlocks, self.events.notes, list[str]()
-        if tags := interlocks.end.unconfirmed(line_time()):
+        end, notes, told = self.driver.kernel.end, self.events.notes, list[str]()
+        if tags := end.unconfirmed(line_time()):
             told.append(f'{what} before the PLC has confirmed: {first(tags)}')
             notes.error(f'rows as it {what}', told[-1])
-        if tags := interlocks.end.not_repeated():
+        if tags := end.not_repeated():
             told.append(f'{what}; confirmed before, but not written again: {first(tags)}')
             notes.warning(f'rows as it {what}', told[-1])
         return told
@@ -333,7 +333,7 @@ class BridgeSession:
         self.events.seen.take_over_fault = ''
         self.reads.latest.clear()
         if self.configuration.parameters.standby:
-            self.driver.interlocks.forget_served()
+            self.driver.kernel.forget_served()
         if self.is_waiting:
             self._surroundings.results.waiting.clear()
 

@@ -19,8 +19,8 @@ from __future__ import annotations
 from enum import IntEnum
 from operator import itemgetter
 
-from abdf1_ros.driver.interlocks.fallback import FallbackRow, FallbackState
-from abdf1_ros.driver.interlocks.heartbeat import BeatState, HeartbeatRow
+from abdf1_ros.driver.kernel.fallback import FallbackRow, FallbackState
+from abdf1_ros.driver.kernel.heartbeat import BeatState, HeartbeatRow
 from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.plan.bounds import Bound, Times
 from abdf1_ros.ros.diagnostics.line import LineView
@@ -48,8 +48,8 @@ class InterlockStatus:
         self._line = line
         self._watched = seen
         driver = line.driver
-        self._beats = driver.interlocks.heartbeats
-        self._fallbacks = driver.interlocks.fallbacks
+        self._beats = driver.kernel.rows.heartbeats
+        self._fallbacks = driver.kernel.rows.fallbacks
         self._checks = driver.checks
         self._bounds = [*Times(driver.network, driver.mappings, driver.readings.blocks).bounds()]
         # Rows that confirm a heartbeat, by the tag of the heartbeat. All other rows share the key

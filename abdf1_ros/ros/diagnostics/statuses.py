@@ -57,7 +57,7 @@ class Diagnostics:
             *(StationStatus(self.line, station, port, seen) for station in driver.stations),
             MappingsStatus(driver, port, left_out), events.writes, TopicsStatus(port, seen),
             *alarms]
-        if driver.interlocks.heartbeats or driver.interlocks.fallbacks:
+        if driver.kernel.rows.heartbeats or driver.kernel.rows.fallbacks:
             self._statuses.append(InterlockStatus(self.line, port, seen))
         if guests:
             self._statuses.append(GuestsStatus(guests, port))

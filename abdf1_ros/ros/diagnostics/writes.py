@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections import Counter
 
-from abdf1_ros.driver.interlocks.fallback import FallbackCause
+from abdf1_ros.driver.kernel.fallback import FallbackCause
 from abdf1_ros.driver.write import Outcome, WriteResult
 from abdf1_ros.ros.diagnostics.status import Judgement, Moment, OK, WARN, with_age
 

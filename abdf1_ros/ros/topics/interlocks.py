@@ -51,16 +51,16 @@ class InterlockWatch:
 
     def __init__(self, node: Node, driver: Driver) -> None:
         self._node = node
-        self._interlocks = driver.interlocks
+        self._kernel = driver.kernel
         self._next_look = 0.0
         self._crowded: tuple[str, ...] = ()
         self._refusing: dict[str, float] = {}  # topics, and since when (clock value in s)
-        rows = [row.mapping for row in self._interlocks.fallbacks]
+        rows = [row.mapping for row in self._kernel.rows.fallbacks]
         self._single = {row.topic for row in rows if row.single_publisher}
         self._counted = {row.topic: None for row in rows if row.topic not in self._single}
         self._timer: Timer | None = None
         self._report_executor()
-        if self._interlocks.heartbeats:
+        if self._kernel.rows.heartbeats:
             # The node's clock may be simulated and stand still, so the timer has a clock of its
             # own.
             self._timer = node.create_timer(
@@ -74,7 +74,7 @@ class InterlockWatch:
 
     def _report_executor(self) -> None:
         """Tell the driver that the executor runs (rule 3 c)."""
-        self._interlocks.executor_ran(line_time())
+        self._kernel.executor_ran(line_time())
 
     def look(self, now: float) -> tuple[str, ...]:
         """
@@ -90,7 +90,7 @@ class InterlockWatch:
 
     def refusing(self, now: float) -> dict[str, str]:
         """Return the topics whose publishers are refused, with their names (rule 28)."""
-        crowds = self._interlocks.conditions.crowds
+        crowds = self._kernel.rows.conditions.crowds
         topics = [topic for topic in self._single
                   if topic in crowds and crowds[topic].until == math.inf]
         self._refusing = {topic: self._refusing.get(topic, now) for topic in topics}

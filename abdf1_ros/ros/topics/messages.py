@@ -20,7 +20,7 @@ from array import array
 from collections.abc import Callable
 import math
 
-from abdf1_ros.driver.writes.queue import MAX_WAITING_WRITES
+from abdf1_ros.driver.kernel.waiting import MAX_WAITING_WRITES
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.values import Values, ValueType
 from abdf1_ros.ros.untyped import RosMessage

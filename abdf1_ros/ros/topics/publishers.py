@@ -32,7 +32,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Protocol
 
-from abdf1_ros.driver.interlocks.own import Crowd
+from abdf1_ros.driver.kernel.own import Crowd
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ros.diagnostics.graph import node_of, UNKNOWN_NODE
 from abdf1_ros.ros.topics.messages import lease_qos, write_qos

@@ -31,8 +31,8 @@ from typing import Protocol
 
 from abdf1_ros.ages import Ages, HostClock, most_ahead, RecentMax, REMEMBERED
 from abdf1_ros.driver.driver import Driver, TOO_MANY
-from abdf1_ros.driver.interlocks.own import Crowd
-from abdf1_ros.driver.writes.queue import MAX_WAITING_WRITES
+from abdf1_ros.driver.kernel.own import Crowd
+from abdf1_ros.driver.kernel.waiting import MAX_WAITING_WRITES
 from abdf1_ros.errors import FormatError
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ros.callbacks import AnsweringNode
@@ -141,7 +141,7 @@ class WriteTopic:
 
     def crowd(self, crowd: Crowd) -> None:
         """Tell the driver that the topic has, or had, more than one publisher (rule 28)."""
-        self._driver.interlocks.crowd(self._topic, crowd)
+        self._driver.kernel.crowd(self._topic, crowd)
         self._wake()
 
     def arrived(self, info: MessageInfo) -> None:

@@ -52,20 +52,21 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.probes import Probes
 from abdf1_ros.driver.agenda import Agenda
 from abdf1_ros.driver.driver import Driver
-from abdf1_ros.driver.flights import Flight, Words
 from abdf1_ros.driver.guests import GuestJob
-from abdf1_ros.driver.interlocks.end import OrderlyEnd
-from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackRow
-from abdf1_ros.driver.interlocks.heartbeat import HeartbeatRow
-from abdf1_ros.driver.interlocks.plc import Plc
-from abdf1_ros.driver.interlocks.queue import Interlocks
+from abdf1_ros.driver.kernel.end import OrderlyEnd
+from abdf1_ros.driver.kernel.fallback import FallbackCause, FallbackRow
+from abdf1_ros.driver.kernel.flights import Flight, Words
+from abdf1_ros.driver.kernel.heartbeat import HeartbeatRow
+from abdf1_ros.driver.kernel.kernel import Kernel
+from abdf1_ros.driver.kernel.plc import Plc
+from abdf1_ros.driver.kernel.rows import OwnRows
+from abdf1_ros.driver.kernel.waiting import WaitingWrites
 from abdf1_ros.driver.reads import job
 from abdf1_ros.driver.reads.guards import CounterGuard, RunGuard
 from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.driver.served import MappedTable
 from abdf1_ros.driver.write import Outcome, Write, WriteResult
-from abdf1_ros.driver.writes.queue import WriteQueue
-from abdf1_ros.driver.writes.under_way import WriteJob
+from abdf1_ros.driver.writes.jobs import WriteJob
 from abdf1_ros.pccc.values import Codec
 from abdf1_ros.plan.bounds import Times
 from abdf1_ros.plan.planner import Block
@@ -150,9 +151,11 @@ def _told_as_not_sent(result: Any) -> Any:
 
 
 def _dropped_in_silence(drop: Any) -> Any:
-    def drop_wrongly(self: WriteQueue, reason: str, now: float, mapping: Any = None) -> None:
-        for write in [write for write in self.waiting if mapping in (None, write.mapping)]:
-            self.waiting.remove(write)
+    def drop_wrongly(self: WaitingWrites, reason: str, now: float, mapping: Any) -> Any:
+        dropped = [write for write in self.writes if mapping in (None, write.mapping)]
+        for write in dropped:
+            self.writes.remove(write)
+        return [write.mapping for write in dropped]
 
     return drop_wrongly
 
@@ -195,18 +198,18 @@ def _meets_one_station(meets: Any) -> Any:
 
 
 def _beats_are_told(ended: Any) -> Any:
-    def end_wrongly(self: Interlocks, flight: Flight, write: Write, now: float) -> None:
-        ended(self, flight, write, now)
-        if write.mapping.is_heartbeat:
-            self._listener.written(write.result(flight.outcome or Outcome.UNKNOWN, '', now))
+    def end_wrongly(self: Kernel, flight: Flight, outcome: Outcome, error: Any = None) -> None:
+        ended(self, flight, outcome, error)
+        if flight.write is not None and flight.write.mapping.is_heartbeat:
+            self.out.append(flight.write.result(outcome, ''))
 
     return end_wrongly
 
 
 def _told_each_time(ended: Any) -> Any:
-    def end_wrongly(self: Interlocks, row: FallbackRow, *arguments: Any) -> None:
-        row.cause = row.cause or FallbackCause.TIMEOUT
-        ended(self, row, *arguments)
+    def end_wrongly(self: FallbackRow, *arguments: Any) -> Any:
+        self.cause = self.cause or FallbackCause.TIMEOUT
+        return ended(self, *arguments)
 
     return end_wrongly
 
@@ -221,7 +224,7 @@ def _never_too_old(init: Any) -> Any:
 
 def _messages_first(first: Any) -> Any:
     def take_wrongly(self: Agenda, now: float, busy: Any) -> Any:
-        return self._writes.waiting and self._usual(now, busy) or first(self, now, busy)
+        return self._messages and self._usual(now, busy) or first(self, now, busy)
 
     return take_wrongly
 
@@ -261,18 +264,17 @@ def _lets_stand(make_all_due: Any) -> Any:
 
 
 def _stores_nothing(init: Any) -> Any:
-    def init_wrongly(self: Interlocks, mappings: Any, writes: Any, writing: Any, served: Any,
-                     *arguments: Any) -> None:
-        init(self, mappings, writes, writing, mock.Mock(wraps=served, store=mock.Mock()),
-             *arguments)
+    def init_wrongly(self: Kernel, *arguments: Any, **named: Any) -> None:
+        *others, table = arguments
+        init(self, *others, mock.Mock(wraps=table, store=mock.Mock()), **named)
 
     return init_wrongly
 
 
 def _told_twice(init: Any) -> Any:
-    def init_wrongly(self: WriteQueue, stations: Any, writing: Any, patience: Any, report: Any,
+    def init_wrongly(self: WaitingWrites, stations: Any, flights: Any, patience: Any, report: Any,
                      *arguments: Any) -> None:
-        init(self, stations, writing, patience, lambda result: (report(result), report(result)),
+        init(self, stations, flights, patience, lambda result: (report(result), report(result)),
              *arguments)
 
     return init_wrongly
@@ -348,7 +350,7 @@ MISTAKES = (
             lambda before: property(lambda self: math.inf)),
     Mistake('3 d', 'it counts without the topics that it requires', HeartbeatRow, '__init__',
             _requires_nothing),
-    Mistake('4', 'heartbeats have results', Interlocks, '_own_ended', _beats_are_told),
+    Mistake('4', 'heartbeats have results', Kernel, 'ended', _beats_are_told),
     Mistake('4', 'a silent station is probed with heartbeats', Plc, 'is_active',
             lambda before: property(lambda self: True)),
     Mistake('4', 'a silent PLC is polled before its fallback', HalfDuplexMaster, 'carry_out',
@@ -364,7 +366,7 @@ MISTAKES = (
     Mistake('11', 'messages go before heartbeats and fallbacks', Agenda, '_own_first',
             _messages_first),
     Mistake('11', 'fallbacks go before the 0', Plc, 'rank', _fallbacks_first),
-    Mistake('12', 'the fallback of a Serve row is not stored', Interlocks, '__init__',
+    Mistake('12', 'the fallback of a Serve row is not stored', Kernel, '__init__',
             _stores_nothing),
     Mistake('15', 'rows are withheld in silence', ReadPoint, 'withhold', _always(False)),
     Mistake('16', 'the bound is Fallback_After alone', Times, 'at_most', _always(0.0)),
@@ -372,16 +374,16 @@ MISTAKES = (
     Mistake('16', 'the preset is a Period', Times, '_preset', _preset_of_a_period),
     Mistake('26', 'messages go out before the connection was heard', Driver, '_connect',
             _always(None)),
-    Mistake('17', 'each writing of a fallback has a result', Interlocks, '_fallback_ended',
+    Mistake('17', 'each writing of a fallback has a result', FallbackRow, 'ended',
             _told_each_time),
     Mistake('results', 'equal messages have a turn each', Write, 'equals', _always(False)),
-    Mistake('results', 'no change gives way to a newer one', WriteQueue, '_gives_way',
+    Mistake('results', 'no change gives way to a newer one', WaitingWrites, 'gives_way',
             _always(False)),
     Mistake('results', 'the first of equal messages has the only result', WriteResult, 'of',
             lambda of: lambda self, origins, now: of(self, origins[:1], now)),
     Mistake('results', 'rows that share words pass each other', Mapping, 'shares_words',
             lambda before: lambda self, other: self is other),
-    Mistake('results', 'a result comes twice', WriteQueue, '__init__', _told_twice),
+    Mistake('results', 'a result comes twice', WaitingWrites, '__init__', _told_twice),
     Mistake('5', 'no fallbacks at the end', FallbackRow, 'end', _always(True)),
     Mistake('7', 'a refused message refreshes its row', FallbackRow, 'message_ended',
             _refused_refreshes),
@@ -389,18 +391,18 @@ MISTAKES = (
             lambda before: lambda self, number, now: number),
     Mistake('7', 'nobody sees that the process stood still', HostClock, 'least_age',
             _always(0.0)),
-    Mistake('7', 'messages wait for ever', WriteQueue, 'patience_of', _always(60.0)),
+    Mistake('7', 'messages wait for ever', WaitingWrites, 'patience_of', _always(60.0)),
     Mistake('8', 'no fallback after the timeout', FallbackRow, 'deadline', _always(math.inf)),
-    Mistake('8', 'a change to RUN is not seen', Interlocks, 'mode_seen', _always(None)),
+    Mistake('8', 'a change to RUN is not seen', Kernel, 'mode_seen', _always(None)),
     Mistake('8', 'a fallback that stands is not written again', Plc, '_refresh_at',
             lambda before: staticmethod(lambda row: math.inf)),
-    Mistake('9', 'a message from before the fallback is sent after it', Interlocks,
+    Mistake('9', 'a message from before the fallback is sent after it', OwnRows,
             'is_overruled', _always(False)),
     Mistake('10', 'a fallback is tried once', FallbackRow, 'ended', _always_confirmed),
     Mistake('13', 'RUN guards nothing', RunGuard, 'why_not', _always('')),
     Mistake('14', 'the counter guards nothing', CounterGuard, 'why_not', _always('')),
-    Mistake('28', 'messages of two publishers are sent', Interlocks, 'why_refused', _always('')),
-    Mistake('28', 'a second publisher ends nothing that waits or stands', Interlocks,
+    Mistake('28', 'messages of two publishers are sent', OwnRows, 'why_refused', _always('')),
+    Mistake('28', 'a second publisher ends nothing that waits or stands', Kernel,
             'new_crowds', _always(())),
     Mistake('18', 'read_only is ignored', Driver, '__init__', _writes_in_spite),
     Mistake('19', 'nobody looks for another writer', HeartbeatRow, 'read_back', _always('')),
@@ -421,7 +423,7 @@ MISTAKES = (
             _meets_one_station),
     Mistake('results', 'not sent is told as written', Write, 'result', _told_as_written),
     Mistake('results', 'unknown is told as not sent', Write, 'result', _told_as_not_sent),
-    Mistake('results', 'messages are dropped in silence', WriteQueue, 'drop',
+    Mistake('results', 'messages are dropped in silence', WaitingWrites, 'drop',
             _dropped_in_silence),
     Mistake('values', 'a value is that of the read before', Codec, 'decode', _value_before),
     Mistake('values', 'a read that stood still is published', job, 'MOST_LATE',

@@ -228,7 +228,7 @@ class Story:
         world = self.world
         world.wind_down(HAND_OVER)
         self.judge.look()  # at what came for the rows of before
-        interlocks = world.driver.interlocks
+        interlocks = world.driver.kernel
         named = interlocks.end.unconfirmed(world.line.now) + interlocks.end.not_repeated()
         if not world.plant.is_read_only:
             self._demand_safe_words(text.partition(' ')[0] for text in named)

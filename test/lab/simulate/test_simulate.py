@@ -353,7 +353,7 @@ def test_end_without_the_port_is_safe_or_names_what_is_not(seconds: float) -> No
     world.run(0.3)
     world.unplug_for(seconds)
     world.end()
-    named = world.driver.interlocks.end.unconfirmed(world.line.now)
+    named = world.driver.kernel.end.unconfirmed(world.line.now)
     assert ('w0_1' in named) is (seconds > LONGEST_END)
     assert (world.plcs[1].word(OUTPUTS) == SAFE) is (seconds < LONGEST_END)
 

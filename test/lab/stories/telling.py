@@ -29,7 +29,7 @@ from functools import partial
 import math
 
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.driver.interlocks.fallback import FallbackState
+from abdf1_ros.driver.kernel.fallback import FallbackState
 from abdf1_ros.driver.write import Outcome
 from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.plan.bounds import MODE_PERIOD
@@ -390,7 +390,7 @@ class Telling:
 
         def open_again() -> None:
             if world.process == process and not world.driver.is_online:
-                world.driver.interlocks.end.resume()
+                world.driver.kernel.end.resume()
                 self._cut_off()
                 world.open()
                 world.opened = world.line.now
@@ -401,16 +401,16 @@ class Telling:
                    is_meant: Callable[[Mapping], bool] = lambda row: True) -> None:
         """Write all 0s and Fallbacks, wait for them, judge what the log names, and go on."""
         world, driver = self.world, self.world.driver
-        if driver.interlocks.end.is_asked or world.line.now < world.away or not world.is_alive:
+        if driver.kernel.end.is_asked or world.line.now < world.away or not world.is_alive:
             raise Pointless
         world.ended = world.line.now
-        driver.interlocks.end.wind_down()
+        driver.kernel.end.wind_down()
         world.line.wake(driver.machine)
 
         def look() -> None:
             if world.driver is not driver:
                 return  # it was killed
-            waits = driver.interlocks.end.has_to_wait(is_open=driver.is_online, is_meant=is_meant)
+            waits = driver.kernel.end.has_to_wait(is_open=driver.is_online, is_meant=is_meant)
             if not waits or world.line.now >= world.ended + limit:
                 self._demand_named()
                 then()
@@ -421,7 +421,7 @@ class Telling:
 
     def _demand_named(self) -> None:
         """Demand that the end names each word that is not safe; none if nothing was wrong (5)."""
-        end = self.world.driver.interlocks.end
+        end = self.world.driver.kernel.end
         named = {text.split(' ')[0] for text in (
             *end.unconfirmed(self.world.line.now), *end.not_repeated())}
         is_well = self._ill_until == -math.inf
@@ -467,9 +467,9 @@ class Telling:
             'results': any(str(number) not in told
                            for number in range(self._forgotten, len(world.keys))),
             'a fallback': any(row.state is not FallbackState.STANDS or not row.is_confirmed
-                              for row in driver.interlocks.fallbacks),
+                              for row in driver.kernel.rows.fallbacks),
             'a heartbeat': any(beat.topics and not beat.is_confirmed
-                               for beat in driver.interlocks.heartbeats),
+                               for beat in driver.kernel.rows.heartbeats),
             'a refresh': self.scene.is_refreshed and world.line.now < overwritten + _REFRESHED,
             'our table': world.master and self._served not in (None, SAFE)}
         return next((reason for reason, is_so in reasons.items() if is_so), '')

@@ -22,8 +22,8 @@ from pathlib import Path
 from typing import Any
 from unittest import mock
 
-from abdf1_ros.driver.flights import Flights, Words
-from abdf1_ros.driver.interlocks.end import OrderlyEnd
+from abdf1_ros.driver.kernel.end import OrderlyEnd
+from abdf1_ros.driver.kernel.flights import Flights, Words
 import pytest
 from stories.scenes import Kind, kinds_of, SCENES, SMALL
 from stories.walk import Ledger, shortest, story_of, tell, text_of, Walk

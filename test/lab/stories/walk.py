@@ -52,8 +52,8 @@ from unittest import mock
 if __name__ == '__main__':  # pytest has its own paths
     sys.path[:0] = [str(Path(__file__).parents[number]) for number in (1, 2, 3)]
 
-from abdf1_ros.driver.interlocks import fallback, plc
-from abdf1_ros.driver.interlocks.heartbeat import HeartbeatRow
+from abdf1_ros.driver.kernel import fallback, plc
+from abdf1_ros.driver.kernel.heartbeat import HeartbeatRow
 from simulate.rules import Broken
 from stories.scenes import Scene, SCENES
 from stories.telling import Pointless, Telling

@@ -25,9 +25,9 @@ from collections.abc import Callable, Iterator
 from collections.abc import Mapping as MappingType
 import math
 
-from abdf1_ros.driver.flights import Flights
-from abdf1_ros.driver.interlocks.own import Conditions
-from abdf1_ros.driver.interlocks.plc import OwnRow, Plc
+from abdf1_ros.driver.kernel.flights import Flights
+from abdf1_ros.driver.kernel.own import Conditions
+from abdf1_ros.driver.kernel.plc import OwnRow, Plc
 from abdf1_ros.driver.write import Outcome
 from abdf1_ros.settings.mapping import Mapping
 

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-The writes that wait for the line.
+The messages that wait for the line.
 
 Equal messages become one write. For words only the newest value waits; for bits each change waits,
 unless the line cannot send all changes. The writes of a station keep their order, and two writes
@@ -23,14 +23,14 @@ of the same words are never under way together.
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Callable, Container, Iterable
+from collections.abc import Callable, Container, Iterable, Iterator
 import itertools
 import math
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.driver.kernel.flights import Flights
 from abdf1_ros.driver.write import key_of, Origin, Outcome, Write, WriteResult
-from abdf1_ros.driver.writes.under_way import WriteJob, WritesUnderWay
 from abdf1_ros.messages import Message
 from abdf1_ros.plan.bounds import CARRIED_WITHIN
 from abdf1_ros.settings.mapping import Mapping
@@ -40,29 +40,26 @@ MAX_WAITING_WRITES = 1000
 _WAITED_LONGER = 'waited longer than %g s for the line'
 
 
-class WriteQueue:
+class WaitingWrites:
     """
     Keep writes until they have the line, for ``patience`` seconds at most.
 
-    Writes are in ``waiting``. ``report`` gets the results. ``tx_delay`` (s) passes before each
-    transmission. A write to a silent station is a probe; if ``stations.probes`` does not admit it,
-    it ends unsent. So does a message of a row whose messages fail while the station replies to
-    others, if ``stations.odd`` does not admit it. ``next_expiry`` is when ``expire`` has work
-    (clock value in s). ``leave_out`` returns why a write that would have the line now is not
-    needed, empty if it is needed.
+    Writes are in ``writes``. ``report`` gets the results of those that end here. ``tx_delay`` (s)
+    passes before each transmission. A write to a silent station is a probe; if ``stations.probes``
+    does not admit it, it ends unsent. So does a message of a row whose messages fail while the
+    station replies to others, if ``stations.odd`` does not admit it. ``next_expiry`` is when
+    ``expire`` has work (clock value in s).
     """
 
-    def __init__(self, stations: ActiveStationList, writing: WritesUnderWay, patience: float,
-                 report: Callable[[WriteResult], None],
-                 leave_out: Callable[[Write, float], str], tx_delay: float = 0.0) -> None:
+    def __init__(self, stations: ActiveStationList, flights: Flights, patience: float,
+                 report: Callable[[WriteResult], None], tx_delay: float = 0.0) -> None:
         self._stations = stations
-        self._writing = writing
+        self._flights = flights
         self._patience = patience
-        self.report = report
-        self._leave_out = leave_out
+        self._report = report
         # TX_Delay is not waiting time; it occurs twice: before the probe and before the command.
         self._slack = 2 * tx_delay
-        self.waiting: deque[Write] = deque()
+        self.writes: deque[Write] = deque()
         self._begun: dict[Mapping, float] = {}  # when a write of a row had the line last
         self._shared: dict[tuple[Mapping, Mapping], bool] = {}
         self.next_expiry = math.inf
@@ -78,14 +75,14 @@ class WriteQueue:
         """
         write.came = now
         self.next_expiry = min(self.next_expiry, self._expiry(write))
-        older = [old for old in self.waiting if old.mapping is write.mapping]
+        older = [old for old in self.writes if old.mapping is write.mapping]
         if not older:
             self._append(write, now)
             return
         last = older[-1]
-        at = self.waiting.index(last)
+        at = self.writes.index(last)
         is_overlapped = any(self._share_words(write.mapping, later.mapping)
-                            for later in itertools.islice(self.waiting, at + 1, None))
+                            for later in itertools.islice(self.writes, at + 1, None))
         if not is_overlapped and last.equals(write) and not self.why_too_old(last, now):
             last.stand_for(write)
             if len(last.origins) > MAX_WAITING_WRITES and last.oldest < last.requested:
@@ -94,17 +91,17 @@ class WriteQueue:
             self._append(write, now)
         else:
             if len(older) > 1 or not is_overlapped:
-                self._end(last, Outcome.SUPERSEDED, '', now)
-            self.waiting.insert(len(self.waiting) if is_overlapped else at, write)
+                self.end(last, Outcome.SUPERSEDED, '', now)
+            self.writes.insert(len(self.writes) if is_overlapped else at, write)
 
     def _append(self, write: Write, now: float) -> None:
         """Append a write; if too many wait, end the oldest write of the row with the most."""
-        self.waiting.append(write)
-        if len(self.waiting) > MAX_WAITING_WRITES:
-            (row, count), = Counter(each.mapping for each in self.waiting).most_common(1)
+        self.writes.append(write)
+        if len(self.writes) > MAX_WAITING_WRITES:
+            (row, count), = Counter(each.mapping for each in self.writes).most_common(1)
             if count > 1:
-                oldest = next(each for each in self.waiting if each.mapping is row)
-                self._end(oldest, Outcome.SUPERSEDED, '', now)
+                oldest = next(each for each in self.writes if each.mapping is row)
+                self.end(oldest, Outcome.SUPERSEDED, '', now)
 
     def _share_words(self, one: Mapping, other: Mapping) -> bool:
         """Tell whether two rows write the same words, or bits; the result is cached."""
@@ -113,72 +110,66 @@ class WriteQueue:
             known = self._shared[one, other] = one.shares_words(other)
         return known
 
-    def next(self, now: float, busy: Container[int] = ()) -> WriteJob | None:  # noqa: A003
+    def first(self, busy: Container[int]) -> Write | None:
         """
-        Return the next write.
+        Return the first write that may have the line, None for none.
 
         Writes to stations in ``busy`` keep waiting, and so do writes of words that are being
         written: the packets of two writes must not mix.
         """
-        self.expire(now)
-        while (write := self._first_free(busy)) is not None:
-            if write.mapping.write_again and (reason := self._leave_out(write, now)):
-                self._end(write, Outcome.STANDS, reason, now)
-                continue
-            if not self._gives_way(write, now):
-                self.waiting.remove(write)
-                self._begun[write.mapping] = now
-                return self._job(write)
-            self._end(write, Outcome.SUPERSEDED, '', now)
+        held_up: set[int] = set()
+        for write in self.writes:
+            station = write.mapping.station
+            is_held_up = bool(held_up) if station == BROADCAST \
+                else station in held_up or BROADCAST in held_up
+            if station not in busy and not is_held_up \
+                    and self._flights.may_begin(write.mapping):
+                return write
+            held_up.add(station)
         return None
 
-    def _job(self, write: Write) -> WriteJob:
-        patience = self.patience_of(write.mapping) + self._slack
-        fallback, latest = write.mapping.fallback, math.inf
-        if fallback:  # all packets of a long write have to be sent before it is due
-            latest = write.requested + fallback.after / 1000 + self._slack
-        return WriteJob(write, self._writing, write.requested + patience, patience=patience,
-                        latest=latest)
+    def begins(self, write: Write, now: float) -> None:
+        """Record that a write has the line: it waits no longer."""
+        self.writes.remove(write)
+        self._begun[write.mapping] = now
 
-    def _gives_way(self, write: Write, now: float) -> bool:
+    def good_within(self, row: Mapping) -> tuple[float, float]:
+        """
+        Return two times (s) from the publication of a message of a row.
+
+        Within the first its first command has to be sent, within the second all of them: a
+        fallback may be due then.
+        """
+        latest = row.fallback.after / 1000 + self._slack if row.fallback else math.inf
+        return self.patience_of(row) + self._slack, latest
+
+    def gives_way(self, write: Write, now: float) -> bool:
         """Tell whether a write is superseded: the line cannot send all changes of its row."""
         within = min(CARRIED_WITHIN, self.patience_of(write.mapping) / 2)
         return now > write.came + within \
             and self._begun.get(write.mapping, -math.inf) > write.came \
             and any(other.mapping is write.mapping and other is not write
-                    for other in self.waiting)
-
-    def _first_free(self, busy: Container[int]) -> Write | None:
-        """Return the first write that does not have to wait."""
-        held_up: set[int] = set()
-        for write in self.waiting:
-            station = write.mapping.station
-            is_held_up = bool(held_up) if station == BROADCAST \
-                else station in held_up or BROADCAST in held_up
-            if station not in busy and not is_held_up \
-                    and self._writing.flights.may_begin(write.mapping):
-                return write
-            held_up.add(station)
-        return None
+                    for other in self.writes)
 
     def youngest(self) -> dict[Mapping, float]:
         """Return, by row, when the youngest message that waits or is under way was published."""
         found: dict[Mapping, float] = {}
-        for write in itertools.chain(self.waiting, self._writing.flights.messages()):
+        for write in itertools.chain(self.writes, self._flights.messages()):
             if write.mapping.fallback is not None:
                 known = found.get(write.mapping, -math.inf)
                 found[write.mapping] = max(write.requested, known)
         return found
 
-    def expire(self, now: float) -> None:
-        """End the writes and messages that must not be sent any more."""
+    def expire(self, now: float) -> Iterator[Mapping]:
+        """End writes and messages that must not be sent any more; yield the rows of writes."""
         stations = self._stations
         if now < self.next_expiry and stations.all_reply_in_time and not stations.odd.failed:
             return
         self.next_expiry = math.inf
-        for write in list(self.waiting):
+        for write in list(self.writes):
             if reason := self._reject_reason(write, now):
-                self._refuse(write, reason, now)
+                self.end(write, Outcome.NOT_SENT, reason, now)
+                yield write.mapping
                 continue
             patience = self.patience_of(write.mapping)
             if now >= write.oldest + patience:
@@ -193,27 +184,23 @@ class WriteQueue:
         after = mapping.fallback.after / 1000 if mapping.fallback else math.inf
         return min(self._patience, after)
 
-    def drop(self, reason: str, now: float, mapping: Mapping | None = None) -> None:
-        """End the waiting writes, of one mapping or all, without sending them."""
-        dropped = [write for write in self.waiting if mapping in (None, write.mapping)]
+    def drop(self, reason: str, now: float, mapping: Mapping | None) -> list[Mapping]:
+        """End the writes of one row or all, without sending them; return their rows."""
+        dropped = [write for write in self.writes if mapping in (None, write.mapping)]
         for write in dropped:
-            self._refuse(write, reason, now)
+            self.end(write, Outcome.NOT_SENT, reason, now)
+        return [write.mapping for write in dropped]
 
-    def _refuse(self, write: Write, reason: str, now: float) -> None:
-        """End a write that must not be sent any more: a fallback may have waited for it."""
-        self._end(write, Outcome.NOT_SENT, reason, now)
-        self._writing.flights.expired(write)
-
-    def _end(self, write: Write, outcome: Outcome, detail: str, now: float) -> None:
+    def end(self, write: Write, outcome: Outcome, detail: str, now: float) -> None:
         """End a write that waits, without sending it."""
-        self.waiting.remove(write)
+        self.writes.remove(write)
         self._tell(write, write.origins, outcome, detail, now)
 
     def _tell(self, write: Write, origins: Iterable[Origin], outcome: Outcome, detail: str,
               now: float) -> None:
         """Report the same result for several messages of a write."""
         for result in write.result(outcome, detail).of(origins, now):
-            self.report(result)
+            self._report(result)
 
     def _expiry(self, write: Write) -> float:
         """Return the clock value (s) from which a write is too old."""

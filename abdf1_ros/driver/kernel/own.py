@@ -19,8 +19,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 import math
 
-from abdf1_ros.driver.flights import Flight, Words
+from abdf1_ros.driver.kernel.flights import Flight, Words
 from abdf1_ros.driver.write import Outcome
+from abdf1_ros.errors import RemoteError
 from abdf1_ros.settings.mapping import Mapping
 
 
@@ -120,6 +121,14 @@ class SelfWritten:
     def has_confirmed(self) -> bool:
         """Tell whether the last write of the row was confirmed."""
         return self.trial is not None and self.trial.outcome is Outcome.WRITTEN
+
+    def note_refusal(self, flight: Flight) -> str:
+        """Record why a write of the row was not confirmed; return a new refusal of the PLC."""
+        if flight.outcome is Outcome.NOT_SENT:
+            return ''
+        before, error = self.refusal, flight.error
+        self.refusal = '' if flight.outcome is Outcome.WRITTEN else str(error)
+        return self.refusal if isinstance(error, RemoteError) and self.refusal != before else ''
 
     @property
     def again_at(self) -> float:

@@ -24,8 +24,8 @@ from enum import Enum
 import math
 from random import Random
 
-from abdf1_ros.driver.flights import Flight, Words
-from abdf1_ros.driver.interlocks.own import Conditions, SelfWritten
+from abdf1_ros.driver.kernel.flights import Flight, Words
+from abdf1_ros.driver.kernel.own import Conditions, SelfWritten
 from abdf1_ros.driver.write import Write
 
 LARGEST = 32_767

@@ -22,9 +22,10 @@ from __future__ import annotations
 
 from enum import Enum
 import math
+from typing import NamedTuple
 
-from abdf1_ros.driver.flights import Flight, Words
-from abdf1_ros.driver.interlocks.own import Conditions, SelfWritten
+from abdf1_ros.driver.kernel.flights import Flight, Words
+from abdf1_ros.driver.kernel.own import Conditions, SelfWritten
 from abdf1_ros.driver.write import Outcome, Write
 from abdf1_ros.settings.heartbeats import LEAST_REFRESH
 from abdf1_ros.settings.limits import raw_values
@@ -44,6 +45,13 @@ class FallbackCause(Enum):
     RUN = 'run'
     END = 'end'
     PUBLISHERS = 'publishers'
+
+
+class Confirmed(NamedTuple):
+    """A fallback has been confirmed: why it was due, and for how long (s)."""
+
+    cause: FallbackCause
+    seconds: float
 
 
 class FallbackState(Enum):
@@ -209,16 +217,17 @@ class FallbackRow(SelfWritten):
         self.tries += 1
         return Write(self.mapping, self._values, now, is_own=True)
 
-    def ended(self, outcome: Outcome, now: float) -> float | None:
+    def ended(self, outcome: Outcome, now: float) -> Confirmed | None:
         """
-        Record how a write of ours ended; return for how long (s) it was due, None for no report.
+        Record how a write of ours ended; return what it has confirmed, None for no report.
 
         It is written again if it has become due since this write began.
         """
-        if outcome is not Outcome.WRITTEN or self.cause is None or self.tried < self._due_since:
+        cause = self.cause
+        if outcome is not Outcome.WRITTEN or cause is None or self.tried < self._due_since:
             return None
         self.cause = None
-        return now - self._due_since
+        return Confirmed(cause, now - self._due_since)
 
     def write_ended(self, flight: Flight, now: float) -> None:
         """Record how a message of this row, or a write of a guest to these words, ended."""

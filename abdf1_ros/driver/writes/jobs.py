@@ -12,48 +12,49 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The writes that have the line, of messages and our own: their begin, sending and end."""
+"""The writes that have the line, of messages and our own: how they are sent, and their end."""
 
 from __future__ import annotations
 
-import math
+from collections.abc import Sequence
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.probes import Asker
 from abdf1_ros.df1.stations import ActiveStationList
-from abdf1_ros.driver.flights import Flight, Flights
+from abdf1_ros.df1.tasks import LineTime
 from abdf1_ros.driver.job_tasks import Job
+from abdf1_ros.driver.kernel.flights import Flight
+from abdf1_ros.driver.kernel.kernel import Kernel, Turn
 from abdf1_ros.driver.reads.readings import Readings
 from abdf1_ros.driver.write import key_of, Outcome, Write, WriteResult
 from abdf1_ros.driver.writes.packets import carry_out
-from abdf1_ros.errors import CommandExpired, INTERNAL_ERROR, PortLost, RemoteError
+from abdf1_ros.errors import (
+    CommandExpired,
+    INTERNAL_ERROR,
+    LinkError,
+    PortLost,
+    RemoteError,
+)
 from abdf1_ros.pccc.dialect import Steps
+from abdf1_ros.pccc.extent import Extent
 from abdf1_ros.settings.mapping import Mapping
 
 
 class WriteJob(Job):
-    """
-    A write that has the line; ``result`` is final when the write has ended.
-
-    With ``is_free`` its time at a silent station does not count as time of probes. ``Job``
-    describes the other arguments.
-    """
+    """A write that has the line; ``result`` is final when the write has ended."""
 
     result: WriteResult
 
-    def __init__(self, write: Write, writing: WritesUnderWay, expires: float, *,
-                 patience: float = 0.0, latest: float = math.inf, is_free: bool = False,
-                 answer_within: float = math.inf) -> None:
-        self.write = write
-        self.station = write.mapping.station
-        self.is_own = write.is_own
-        self.key = key_of(write.mapping, is_own=write.is_own)
-        self.asker = Asker.OWN if write.is_own else Asker.MESSAGE
-        self.expires, self.patience, self.latest = expires, patience, latest
-        self.is_free = is_free
-        self.answer_within = answer_within
+    def __init__(self, turn: Turn, writing: WritesUnderWay) -> None:
+        self.flight, self.write = turn.flight, turn.write
+        self.station = self.write.mapping.station
+        self.is_own = self.write.is_own
+        self.key = key_of(self.write.mapping, is_own=self.is_own)
+        self.asker = Asker.OWN if self.is_own else Asker.MESSAGE
+        self.expires, self.patience, self.latest = turn.expires, turn.patience, turn.latest
+        self.is_free = turn.is_free
+        self.answer_within = turn.answer_within
         self._writing = writing
-        self.flight = writing.begin(write)
 
     def steps(self, now: float) -> Steps[None]:
         """Send every packet."""
@@ -74,20 +75,19 @@ def is_message_of(row: Mapping, job: Job) -> bool:
 
 
 class WritesUnderWay:
-    """Carry out writes, and report their ends to ``flights``, to stations and to reads."""
+    """Carry out writes, and report their ends to the ``kernel``, to stations and to reads."""
 
-    def __init__(self, stations: ActiveStationList, flights: Flights, readings: Readings) -> None:
-        self.flights = flights
-        self.line = flights.line
-        self.stations = stations
+    def __init__(self, stations: ActiveStationList, line: LineTime, kernel: Kernel,
+                 readings: Readings) -> None:
+        self._stations, self._line = stations, line
+        self._kernel = kernel
         self._readings = readings
         self.spent: dict[Mapping, float] = {}  # line time (s) of each row's messages
 
-    def begin(self, write: Write) -> Flight:
-        """Record that a write is under way, until it has ``ended``."""
-        station = write.mapping.station
-        write.is_probe = station != BROADCAST and not self.stations[station].replies_in_time
-        return self.flights.begin(station, (write.mapping.extent,), write)
+    @property
+    def is_rewriting(self) -> bool:
+        """Tell whether a write under way has read a word to write it back changed."""
+        return self._kernel.flights.is_rewriting
 
     def carry_out(self, write: Write) -> Steps[WriteResult]:
         """Send a write in the packets that its station accepts."""
@@ -97,16 +97,26 @@ class WritesUnderWay:
     def ended(self, job: WriteJob) -> None:
         """Record the end of the write, with its result for each message."""
         write, result, station = job.write, job.result, job.station
+        now, begun = self._line.now, job.flight.begun
         if not write.is_own:
-            self.flights.tell(job.flight, result, self._readings.blocks)
+            self._kernel.told(job.flight, result, is_read=self._readings.are_read(write.mapping))
         if station != BROADCAST and not (job.is_free and write.is_probe):
-            self.stations.tried(station, job.flight.begun, self.line.now,
-                                was_silent=write.is_probe, asker=job.asker)
+            self._stations.tried(station, begun, now, was_silent=write.is_probe, asker=job.asker)
         if isinstance(result.error, RemoteError):
-            self.stations[station].remote_errors += 1
+            self._stations[station].remote_errors += 1
         elif result.error is not None and not isinstance(result.error, CommandExpired):
             self._readings.link_failed(station, result.error)
         if not write.is_own:
-            took = self.line.took(job.flight.begun, self.line.now)
+            took = self._line.took(begun, now)
             self.spent[write.mapping] = self.spent.get(write.mapping, 0.0) + took
-        self.flights.ended(job.flight, result.outcome, result.error)
+        self.landed(job.flight, result.outcome, result.error)
+
+    def begin_guest(self, station: int, extents: Sequence[Extent] | None) -> Flight:
+        """Record that a command of a guest has the line; it writes ``extents``, None: unknown."""
+        return self._kernel.guest(station, extents)
+
+    def landed(self, flight: Flight, outcome: Outcome,
+               error: LinkError | RemoteError | None) -> None:
+        """Record how any write has ended: its words are to be read at once."""
+        self._kernel.ended(flight, outcome, error)
+        self._readings.reads.write_ended(flight)

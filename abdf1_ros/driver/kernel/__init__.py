@@ -13,9 +13,13 @@
 # limitations under the License.
 
 """
-Writes of the bridge itself: heartbeats and fallback values (docs/heartbeats.md).
+The decision what may be written to the PLCs of a line (docs/heartbeats.md).
 
-- ``queue``: at each turn of the line it returns the write that is due.
-- ``plc``: the rows of one station, and which of them goes first.
-- ``heartbeat``, ``fallback``: one row each, with its rules; ``own``: what they share.
+``kernel`` takes the events and is the only gate to the line. The other modules answer questions:
+
+- ``flights``: each write from its turn on: what may still land, and what stands.
+- ``waiting``: the messages that wait for the line; ``reasons``: why a message is not taken.
+- ``rows``: the heartbeats and fallbacks of the line; ``turns``: which of them goes first.
+- ``plc``: the rows of one station; ``heartbeat``, ``fallback``: one row each, with its rules;
+  ``own``: what they share; ``end``: the orderly end.
 """

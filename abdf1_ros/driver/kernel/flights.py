@@ -24,14 +24,13 @@ has written over, which value stands, which result waits for a read.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import auto, Enum
 import math
-from typing import Protocol
 
 from abdf1_ros.df1.stations import ActiveStationList
-from abdf1_ros.driver.job_tasks import LineTime
+from abdf1_ros.df1.tasks import LineTime
 from abdf1_ros.driver.write import Outcome, outcome_of, Write, WriteResult
 from abdf1_ros.errors import LinkError, RemoteError
 from abdf1_ros.pccc.extent import Extent, OUR_TABLE
@@ -147,26 +146,6 @@ def _key_of(flight: Flight) -> tuple[object, ...]:
     """Return the words of a flight, and its values if they are ours: each of them may land."""
     write = flight.write
     return flight.station, flight.extents, write.raw if write is not None and write.is_own else ()
-
-
-class WriteListener:
-    """A listener to all writes; methods that are not overridden do nothing."""
-
-    def earlier_may_land(self, stations: Container[int]) -> None:
-        """Take the stations whose gateways may hold writes from before the port was opened."""
-
-    def write_ended(self, flight: Flight) -> None:
-        """Take a write that has ended."""
-
-    def write_expired(self, write: Write) -> None:
-        """Take a message that has ended before it had the line."""
-
-
-class WordsListener(Protocol):
-    """A listener to the words of all good reads."""
-
-    def words_read(self, block: Block, data: bytes, started: float) -> None:
-        """Take the words of a block; its read began at ``started`` (clock value, s)."""
 
 
 class Words:
@@ -328,6 +307,7 @@ class Flights:
 
     - ``has_sent``: a write to a PLC has begun, also before ~/reload.
     - ``unread``: writes that have ended, and whose results wait for a read.
+    - ``repeated``: the words of rows with Write_Again, whose values may stand.
     - ``opened_until``: until when a gateway may deliver a write from before the port was opened.
     """
 
@@ -345,22 +325,15 @@ class Flights:
         self._late: list[Flight] = []  # have ended, and may land; the last one of each _key_of
         self.unread: list[Flight] = []
         self._words: dict[Mapping, Words] = {}
-        self._repeated: list[Words] = []  # of rows with Write_Again
+        self.repeated: list[Words] = []
         self._sharing: dict[Mapping, list[Words]] = {}  # cached, as it takes long to find out
-        self._listeners: tuple[WriteListener, ...] = ()
-        self.readers: tuple[WordsListener, ...] = ()
-
-    def connect(self, listeners: tuple[WriteListener, ...],
-                readers: tuple[WordsListener, ...]) -> None:
-        """Send all writes to ``listeners``, and all good reads to ``readers``, from now on."""
-        self._listeners, self.readers = listeners, readers
 
     def words_of(self, row: Mapping) -> Words:
         """Return the words of a row; watch them from now on."""
         if row not in self._words:
             self._words[row] = Words(row, self)
             if row.write_again:
-                self._repeated.append(self._words[row])
+                self.repeated.append(self._words[row])
         return self._words[row]
 
     # What happens
@@ -368,14 +341,6 @@ class Flights:
     def opened(self) -> None:
         """Record that gateways may hold earlier writes: the port has been opened."""
         self.opened_until = self.line.now + self._settle_time
-        behind = {station.number for station in self._stations if station.has_gateway}
-        for listener in self._listeners:
-            listener.earlier_may_land(behind)
-
-    def gateway_replied(self, station: int) -> None:
-        """Record that a station turned out to be behind a gateway after the port was opened."""
-        for listener in self._listeners:
-            listener.earlier_may_land({station})
 
     def take_over(self, before: Flights) -> None:
         """Take the writes of the driver before that may still land, also of rows that are gone."""
@@ -412,13 +377,6 @@ class Flights:
                             and _key_of(late) != _key_of(flight)), flight]
         for words in self._disturbed(flight):
             words.ended(flight)
-        for listener in self._listeners:
-            listener.write_ended(flight)
-
-    def expired(self, write: Write) -> None:
-        """Tell the listeners that a message has ended before it had the line."""
-        for listener in self._listeners:
-            listener.write_expired(write)
 
     def _disturbed(self, flight: Flight) -> Iterable[Words]:
         """Return the words that a write may change, or may have changed."""
@@ -432,13 +390,17 @@ class Flights:
 
     # Results that wait for a read
 
-    def tell(self, flight: Flight, result: WriteResult, blocks: Iterable[Block]) -> None:
-        """Report the result of a message; an unconfirmed result waits for a read of its words."""
+    def tell(self, flight: Flight, result: WriteResult, *, is_read: bool) -> None:
+        """
+        Report the result of a message; an unconfirmed result waits for a read of its words.
+
+        Its words are all read if it ``is_read``.
+        """
         assert flight.write is not None
         flight.result = result
         if not result.is_unconfirmed:
             self._tell(flight)
-        elif any(block.extent.holds(flight.write.mapping.extent) for block in blocks):
+        elif is_read:
             self.unread.append(flight)
         else:
             self._tell(flight, 'not read back: no row reads all of these words')
@@ -452,7 +414,7 @@ class Flights:
                 is_held = flight.write.is_held(data[block.slice_of(row)])
                 which = 'the value' if is_held else 'another value'
                 self._tell(flight, f'read back: the PLC holds {which}')
-        for words in self._repeated:
+        for words in self.repeated:
             if block.extent.holds(words.row.extent):
                 words.words_read(data[block.slice_of(words.row)], started)
 
@@ -486,7 +448,7 @@ class Flights:
 
     def forget(self, station: int | None = None) -> None:
         """Forget the values of a station that may be another PLC now; without a number, of all."""
-        for words in self._repeated:
+        for words in self.repeated:
             if station in (None, words.row.station):
                 words.forget()
 

@@ -28,10 +28,10 @@ from operator import attrgetter
 
 from abdf1_ros.df1.probes import OTHERS_SHARE
 from abdf1_ros.df1.stations import ActiveStationList
-from abdf1_ros.driver.flights import Flight, Flights
-from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackRow, FallbackState
-from abdf1_ros.driver.interlocks.heartbeat import HeartbeatRow
-from abdf1_ros.driver.interlocks.own import Conditions
+from abdf1_ros.driver.kernel.fallback import FallbackCause, FallbackRow, FallbackState
+from abdf1_ros.driver.kernel.flights import Flight, Flights
+from abdf1_ros.driver.kernel.heartbeat import HeartbeatRow
+from abdf1_ros.driver.kernel.own import Conditions
 from abdf1_ros.driver.write import key_of, Outcome
 from abdf1_ros.settings.heartbeats import LEAST_REFRESH
 from abdf1_ros.settings.mapping import Mapping
