@@ -64,7 +64,8 @@ from abdf1_ros.paths import config_file, expanded
 from abdf1_ros.pccc.data_table import NoSuchFile
 from abdf1_ros.ports.descriptor import Port, PortAround
 from abdf1_ros.ports.endpoints import Endpoint, PtyEndpoint, SerialEndpoint, TcpEndpoint
-from abdf1_ros.ports.link_thread import LinkThread, PortKind, PortState
+from abdf1_ros.ports.link_thread import LinkThread
+from abdf1_ros.ports.port_thread import PortKind, PortState
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.settings import BAUD_RATES
 from abdf1_ros.settings.network import make_network, Network, URLS

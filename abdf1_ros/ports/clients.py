@@ -21,14 +21,12 @@ from contextlib import suppress
 import math
 import select
 import socket
-import threading
 from typing import Generic, Protocol, TypeVar
 
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.descriptor import READ_SIZE
 from abdf1_ros.ports.endpoints import TCP_OPTIONS
-from abdf1_ros.ports.link_thread import PortKind, PortState, RELEASED
-from abdf1_ros.ports.wake import Wake
+from abdf1_ros.ports.port_thread import PortKind, PortState, PortThread, RELEASED
 
 GLANCE = 0.1
 """Longest wait (s); it also limits the error of the age of what a client sends."""
@@ -197,7 +195,7 @@ class ClientsPort(Generic[_Talk]):
             yield client.talk
 
 
-class ClientsThread(threading.Thread, Generic[_Talk]):
+class ClientsThread(PortThread, Generic[_Talk]):
     """
     Serve the clients at ``host`` and ``port`` until ``stop``; ``release`` closes the port.
 
@@ -208,54 +206,16 @@ class ClientsThread(threading.Thread, Generic[_Talk]):
     def __init__(self, host: str, port: int, server: ClientsHandler[_Talk],
                  on_fault: Callable[[Exception], None],
                  clock: Callable[[], float] = line_time) -> None:
-        super().__init__(name='clients', daemon=True)
-        self.state = PortState(False, 'not opened yet')
-        self.has_failed = False
-        self.is_released = False
+        super().__init__('clients', on_fault)
+        self.daemon = True  # a client never keeps the process alive
         self._address = host, port
         self._server = server
-        self._on_fault = on_fault
         self._clock = clock
-        self._is_stopping = False
-        self._is_free = threading.Event()
-        self._wake = Wake()
 
-    def wake(self) -> None:
-        """Call ``turn`` of the server soon; may be called from any thread."""
-        self._wake.set()
-
-    def release(self) -> None:
-        """Close the port and all connections until ``take``; wait for it, at most 5 s."""
-        self._is_free.clear()
-        self.is_released = True
-        self.wake()
-        if self.is_alive():
-            self._is_free.wait(5.0)
-
-    def take(self) -> None:
-        """Listen again."""
-        self.is_released = False
-        self.wake()
-
-    def stop(self) -> None:
-        """End the thread, and wait for its end."""
-        self._is_stopping = True
-        self.wake()
-        if self.is_alive():
-            self.join()
-        self._wake.close()
-
-    def run(self) -> None:
-        """Listen and serve."""
-        try:
-            while not self._is_stopping:
-                self._open()
-            self.state = PortState(False, 'closed')
-        except Exception as error:  # a bug that belongs to no client
-            self.has_failed = True
-            self.state = PortState(False, f'internal error: {error!r}')
-            self._on_fault(error)
-        self._is_free.set()
+    def _keep_open(self) -> None:
+        while not self._stopping:
+            self._open()
+        self.state = PortState(False, 'closed')
 
     def _open(self) -> None:
         """Serve as long as the port may be open; or wait until it may."""
@@ -273,7 +233,7 @@ class ClientsThread(threading.Thread, Generic[_Talk]):
             return
         self.state = PortState(True, 'open')
         try:
-            while not (self._is_stopping or self.is_released):
+            while not (self._stopping or self.is_released):
                 self._serve(port)
         finally:
             for talk in port.close():

@@ -18,8 +18,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from enum import Enum
 import math
 import threading
 import time
@@ -29,7 +27,7 @@ from abdf1_ros.errors import INTERNAL_ERROR, PortLost
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.descriptor import NoClient, Port, READ_SIZE
 from abdf1_ros.ports.pace import Pace
-from abdf1_ros.ports.wake import Wake
+from abdf1_ros.ports.port_thread import PortKind, PortState, PortThread, RELEASED
 
 # Time (s) between attempts to open a port. An attempt costs almost nothing. A person who has
 # plugged the cable in again waits for it.
@@ -44,28 +42,8 @@ _DROPPED = 65536  # bytes of a flood that are dropped between two rests
 _PORTION = 64  # most bytes of one step of work, if bytes come too fast
 
 
-class PortKind(Enum):
-    """The reason why a port is not open."""
-
-    NO_CLIENT = 'this end is open, but no program has opened the other end'
-    UNAVAILABLE = 'it cannot be opened'
-    OTHER = ''
-
-
-@dataclass(frozen=True, slots=True)
-class PortState:
-    """Whether the port is open, with a text for users; ``kind`` is the reason if it is not."""
-
-    is_open: bool
-    text: str
-    kind: PortKind = field(default=PortKind.OTHER, compare=False)
-
-
-RELEASED = 'polling is off, so other programs may use the port'
-
 # The error for all commands that are under way when files are read again.
 _READ_AGAIN = 'the files have been read again'
-EXCHANGE_LIMIT = 5.0
 _GLANCE = 0.1
 
 
@@ -131,7 +109,7 @@ class Attempt(threading.Thread):
             self.port.close()
 
 
-class LinkThread(threading.Thread):
+class LinkThread(PortThread):
     """
     Run ``machine`` on the port that ``open_port`` opens; open it again when it is lost.
 
@@ -144,8 +122,7 @@ class LinkThread(threading.Thread):
     ``on_fault`` is called with an exception that is a bug. The machine then starts again. Three
     such exceptions within a minute end the thread, and ``has_failed`` becomes True.
 
-    ``release`` closes the port for other programs until ``take``. ``exchange`` puts another
-    machine on the line.
+    ``exchange`` puts another machine on the line.
     """
 
     def __init__(self, machine: Machine, open_port: Callable[[], Port], *,
@@ -156,15 +133,10 @@ class LinkThread(threading.Thread):
                  longest_wait: float = math.inf,
                  clock: Callable[[], float] = line_time,
                  processor_clock: Callable[[], float] = time.thread_time) -> None:
-        super().__init__(name='df1 link')
-        self.state = PortState(False, 'not opened yet')
-        self.has_failed = False
-        self.is_released = False
-        self._is_free = threading.Event()
+        super().__init__('df1 link', on_fault)
         self._machine = machine
         self._open_port = open_port
         self._on_state = on_state
-        self._on_fault = on_fault
         self._while_sending = while_sending
         self.retry_period = retry_period
         self._longest_wait = longest_wait
@@ -173,37 +145,7 @@ class LinkThread(threading.Thread):
         self._pace = Pace(clock, processor_clock)
         self._next: _Exchange | None = None
         self.has_turned = True  # a supervisor sets it to False, and looks for True later
-        self._stopping = False
         self._faults: deque[float] = deque(maxlen=_MAX_FAULTS)
-        self._wake = Wake()
-
-    def wake(self) -> None:
-        """Let the machine look for new work; may be called from any thread."""
-        self._wake.set()
-
-    def ask_to_stop(self) -> None:
-        """Begin the end of the thread; ``stop`` waits for it."""
-        self._stopping = True
-        self.wake()
-
-    def stop(self) -> None:
-        """End the thread, with an error for commands under way, and wait for its end."""
-        self.ask_to_stop()
-        if self.is_alive():
-            self.join()
-        self._wake.close()
-
-    def release(self) -> bool:
-        """Close the port until ``take``; return whether it is closed within 5 s."""
-        self._is_free.clear()
-        self.is_released = True
-        self.wake()
-        return self._has_happened(self._is_free)
-
-    def take(self) -> None:
-        """Open the port again."""
-        self.is_released = False
-        self.wake()
 
     def exchange(self, machine: Machine, while_sending: Callable[[], None], reopen: bool,
                  reason: str = _READ_AGAIN,
@@ -222,24 +164,10 @@ class LinkThread(threading.Thread):
         return self._has_happened(exchange.is_done) or (
             not exchange.claim() and self._has_happened(exchange.is_done))
 
-    def _has_happened(self, event: threading.Event) -> bool:
-        """Wait up to 5 s until this thread has set an event; not if the thread has ended."""
-        give_up = time.monotonic() + EXCHANGE_LIMIT
-        # The node takes calls a moment before its link starts; ``ident`` is None until then.
-        while not event.wait(_GLANCE) and (self.ident is None or self.is_alive()) \
-                and time.monotonic() < give_up:
-            pass
-        return event.is_set()
-
     def run(self) -> None:
         """Keep the port open and the machine running."""
         self.came_after = self._clock()
-        try:
-            self._keep_open()
-        except Exception as error:  # a bug outside of the machine
-            self.has_failed = True
-            self.state = PortState(False, f'internal error: {error!r}')
-            self._on_fault(error)
+        super().run()
 
     @property
     def _is_interrupted(self) -> bool:

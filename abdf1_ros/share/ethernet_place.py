@@ -31,7 +31,6 @@ from abdf1_ros.driver.guest_rules import ShareAccess
 from abdf1_ros.driver.guests import Guest, GuestCommand, GuestListener, GuestQueue
 from abdf1_ros.ports.clients import ClientsThread, GLANCE
 from abdf1_ros.ports.clock import line_time
-from abdf1_ros.ports.link_thread import PortKind
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.share import SharePlace
 from abdf1_ros.text import counted
@@ -84,8 +83,7 @@ class EthernetPlace:
     @property
     def fault(self) -> str:
         """Return why no program can connect; empty if a program can."""
-        state = self.link.state
-        return state.text if state.kind is PortKind.UNAVAILABLE or self.link.has_failed else ''
+        return self.link.fault
 
     @property
     def waiting(self) -> int:
@@ -94,10 +92,7 @@ class EthernetPlace:
 
     def start(self) -> None:
         """Wait for clients, and serve them; also after ``pause``."""
-        if self.link.is_released:
-            self.link.take()
-        else:
-            self.link.start()
+        self.link.begin()
 
     def pause(self) -> None:
         """Close the place and disconnect all clients until the next ``start``."""

@@ -33,7 +33,8 @@ from abdf1_ros.driver.guests import Guest, GuestCommand, GuestListener, GuestQue
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.descriptor import Port
 from abdf1_ros.ports.endpoints import Endpoint, PtyPlace, SerialEndpoint, TcpEndpoint
-from abdf1_ros.ports.link_thread import LinkThread, PortKind, PortState
+from abdf1_ros.ports.link_thread import LinkThread
+from abdf1_ros.ports.port_thread import PortState
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.share import SharePlace, station_of
@@ -132,9 +133,7 @@ class GuestLine:
     @property
     def fault(self) -> str:
         """Return why no program can connect; empty if a program can."""
-        state = self.link.state
-        is_shut = state.kind is PortKind.UNAVAILABLE or self.link.has_failed
-        return state.text if is_shut else ''
+        return self.link.fault
 
     @property
     def waiting(self) -> int:
@@ -143,10 +142,7 @@ class GuestLine:
 
     def start(self) -> None:
         """Wait for the guest, and serve it; also after ``pause``."""
-        if self.link.is_released:
-            self.link.take()
-        else:
-            self.link.start()
+        self.link.begin()
 
     def pause(self) -> None:
         """Close the place and disconnect the guest until the next ``start``."""

@@ -32,7 +32,7 @@ from abdf1_ros.cli.simulator import Cast, main, parse_options
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.paths import config_file
-from abdf1_ros.ports.link_thread import PortKind, PortState
+from abdf1_ros.ports.port_thread import PortKind, PortState
 from abdf1_ros.simulator.ladder import Lamp
 import pytest
 from support.cases import for_all

@@ -29,7 +29,8 @@ from abdf1_ros.df1.machine import LineTiming, Listen, Machine, Procedure, Rest, 
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import CommandExpired
 from abdf1_ros.ports.descriptor import DescriptorPort, READ_SIZE
-from abdf1_ros.ports.link_thread import LinkThread, PortState, RELEASED
+from abdf1_ros.ports.link_thread import LinkThread
+from abdf1_ros.ports.port_thread import PortState, RELEASED
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.trace import PortOpener
 import pytest
@@ -383,7 +384,7 @@ def test_request_that_comes_together_with_bytes_is_taken_after_them() -> None:
 
 def test_rest_in_a_burst_ends_with_the_deadline(monkeypatch: pytest.MonkeyPatch) -> None:
     wake = Mock(descriptor=0, take=lambda: False)
-    monkeypatch.setattr('abdf1_ros.ports.link_thread.Wake', lambda: wake)
+    monkeypatch.setattr('abdf1_ros.ports.port_thread.Wake', lambda: wake)
     for timeout, rest in ((0.005, 11), (3600.0, 64)):
         script = Script(Send(b'?', timeout), timing=LineTiming(0.001))
         port = Babbler(bytes(64), 2)

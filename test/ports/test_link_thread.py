@@ -31,8 +31,9 @@ from abdf1_ros.df1.machine import Listen, Rest, Send, Step
 from abdf1_ros.errors import INTERNAL_ERROR, PortLost
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.descriptor import Port
-from abdf1_ros.ports.link_thread import Attempt, LinkThread, PortKind, PortState
+from abdf1_ros.ports.link_thread import Attempt, LinkThread
 from abdf1_ros.ports.opening import open_port
+from abdf1_ros.ports.port_thread import PortKind, PortState
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.wake import Wake
 import pytest
@@ -199,7 +200,7 @@ def test_missing_port_is_waited_for_asleep(monkeypatch: pytest.MonkeyPatch) -> N
         raise OSError('no')
 
     counted = Counted()
-    monkeypatch.setattr('abdf1_ros.ports.link_thread.Wake', lambda: counted)
+    monkeypatch.setattr('abdf1_ros.ports.port_thread.Wake', lambda: counted)
     thread = LinkThread(Script().machine, refuse, retry_period=0.05,
                         on_state=lambda state: thread.wake())
     thread.run()
@@ -472,7 +473,7 @@ class _Stuck(NoLine):
 
 
 def test_machine_that_came_to_nothing_does_not_come_later(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr('abdf1_ros.ports.link_thread.EXCHANGE_LIMIT', 0.0)
+    monkeypatch.setattr('abdf1_ros.ports.port_thread.LONGEST_HAND_OVER', 0.0)
     port, before, after = _Stuck(), Script(Rest()), Script(Rest())
     thread = LinkThread(before.machine, lambda: port)
     thread.start()
@@ -485,7 +486,7 @@ def test_machine_that_came_to_nothing_does_not_come_later(monkeypatch: pytest.Mo
     port.free.clear()
     thread.take()
     assert port.is_used.wait(PATIENCE)  # by whatever machine there is now
-    monkeypatch.setattr('abdf1_ros.ports.link_thread.EXCHANGE_LIMIT', 0.0)
+    monkeypatch.setattr('abdf1_ros.ports.port_thread.LONGEST_HAND_OVER', 0.0)
     assert not thread.release()  # which has not happened a second time
     port.free.set()
     thread.stop()

@@ -47,7 +47,8 @@ from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity, Mode
 from abdf1_ros.pccc.values import Values
 from abdf1_ros.plan.bounds import Times
-from abdf1_ros.ports.link_thread import LinkThread, PortState, RELEASED
+from abdf1_ros.ports.link_thread import LinkThread
+from abdf1_ros.ports.port_thread import PortState, RELEASED
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.ros.diagnostics.dds import LOST

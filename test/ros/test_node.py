@@ -29,7 +29,7 @@ from typing import Any
 from abdf1_ros.driver.kernel import waiting
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.ports.link_thread import PortState
+from abdf1_ros.ports.port_thread import PortState
 from abdf1_ros.ros.bridge.node import end_together
 from abdf1_ros.ros.diagnostics import graph
 from diagnostic_msgs.msg import DiagnosticStatus

@@ -22,7 +22,7 @@ from types import SimpleNamespace
 from typing import Any
 from unittest.mock import MagicMock, Mock
 
-from abdf1_ros.ports.link_thread import PortState
+from abdf1_ros.ports.port_thread import PortState
 from abdf1_ros.ros.bridge.node import BridgeNode
 from abdf1_ros.ros.bridge.session import BridgeSession
 from abdf1_ros.ros.bridge.standby import Service, Standby

@@ -22,8 +22,9 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Symbol
 from abdf1_ros.df1.machine import LineTiming, Machine, Procedure, Rest, Send, Silence, Step
 from abdf1_ros.ports.descriptor import Port
-from abdf1_ros.ports.link_thread import LinkThread, PortState
+from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.ports.opening import open_port
+from abdf1_ros.ports.port_thread import PortState
 from abdf1_ros.ports.settings import PortSettings
 from support.ptys import PATIENCE, Pty
 

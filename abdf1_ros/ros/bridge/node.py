@@ -28,7 +28,8 @@ from typing import Unpack
 from abdf1_ros.driver.driver import ENDS
 from abdf1_ros.driver.kernel.waiting import MAX_WAITING_WRITES
 from abdf1_ros.ports.clock import line_time
-from abdf1_ros.ports.link_thread import LinkThread, PortState
+from abdf1_ros.ports.link_thread import LinkThread
+from abdf1_ros.ports.port_thread import PortState
 from abdf1_ros.ports.settings import Lack, PortSettings
 from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.problems import ConfigurationError

@@ -31,7 +31,8 @@ from abdf1_ros.pccc.values import Values
 from abdf1_ros.plan.forecast import USUAL_RESPONSE_TIME
 from abdf1_ros.plan.report import Remark, Report, setting_remarks
 from abdf1_ros.ports.clock import line_time
-from abdf1_ros.ports.link_thread import LinkThread, PortState
+from abdf1_ros.ports.link_thread import LinkThread
+from abdf1_ros.ports.port_thread import PortState
 from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.ros.bridge.guests import GuestPlaces
 from abdf1_ros.ros.bridge.offer import OfferedPublisher

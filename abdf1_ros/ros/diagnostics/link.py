@@ -27,7 +27,7 @@ from abdf1_ros.driver.reads.job import ReadJob
 from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.pccc.link_counters import NO_MEMORY, UNSENT
 from abdf1_ros.ports.clock import line_time
-from abdf1_ros.ports.link_thread import RELEASED
+from abdf1_ros.ports.port_thread import RELEASED
 from abdf1_ros.ros.diagnostics.line import LineView, takes_in_silence
 from abdf1_ros.ros.diagnostics.status import ERROR, Judgement, OK, period_of, Seen, WARN, with_age
 from abdf1_ros.settings.network import Network
