@@ -25,7 +25,7 @@ from typing import Generic, Protocol, TypeVar
 
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.descriptor import READ_SIZE
-from abdf1_ros.ports.endpoints import TCP_OPTIONS
+from abdf1_ros.ports.endpoints import listening, TCP_OPTIONS
 from abdf1_ros.ports.port_thread import PortKind, PortState, PortThread, RELEASED
 
 GLANCE = 0.1
@@ -124,9 +124,7 @@ class ClientsPort(Generic[_Talk]):
     """A listening TCP port, and the clients that have come; OSError if it cannot listen."""
 
     def __init__(self, host: str, port: int) -> None:
-        family = socket.AF_INET6 if ':' in host else socket.AF_INET
-        self._listener = socket.create_server((host, port), family=family)
-        self._listener.setblocking(False)
+        self._listener = listening(host, port)
         self._rests_until = -math.inf
         self._clients: dict[int, _ClientEnd[_Talk]] = {}
 

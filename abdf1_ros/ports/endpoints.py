@@ -305,6 +305,14 @@ def _has_left(client: socket.socket) -> bool:
     return bool(closed.poll(0))
 
 
+def listening(host: str, port: int) -> socket.socket:
+    """Return a socket that listens, and does not wait for a client; OSError if it cannot."""
+    family = socket.AF_INET6 if ':' in host else socket.AF_INET
+    listener = socket.create_server((host, port), family=family)
+    listener.setblocking(False)
+    return listener
+
+
 class TcpEndpoint:
     """
     A listening TCP port, which one client at a time uses as a line; with 0, any free port.
@@ -318,9 +326,7 @@ class TcpEndpoint:
 
     def __init__(self, host: str, port: int, tell: Callable[[str], None] = lambda other: None,
                  glance: float = _GLANCE, count_frames: Callable[[], int] | None = None) -> None:
-        family = socket.AF_INET6 if ':' in host else socket.AF_INET
-        self._listener = socket.create_server((host, port), family=family)
-        self._listener.setblocking(False)
+        self._listener = listening(host, port)
         self._tell = tell
         self._glance = glance
         self._next: socket.socket | None = None
