@@ -346,7 +346,7 @@ class ReadBack(Rule):
         _, value = self.world.keys[number]
         published = self.world.counts_from[number]
         when = published + result.latency
-        sent = [each for each in self._sent[row.tag, value] if published <= each <= when]
+        sent = [each for each in self._sent[row.tag, value] if published <= each < when]
         found = self.world.plcs[row.station].answered(row.address, row.address.offset, when)
         self.demand(found is not None and found[0] >= max(sent), result, 'not read since', sent)
         is_held = result.detail.endswith(f'{_READ_BACK} the value')

@@ -180,6 +180,10 @@ class Ledger:
         """Keep what came of a story."""
         self._hashes[text_of(one.story)] = _hash_of(one)
 
+    def has(self, one: Told) -> bool:
+        """Tell whether a story is kept."""
+        return text_of(one.story) in self._hashes
+
     def differs(self, one: Told) -> bool:
         """Tell whether something else came of a story."""
         return self._hashes.get(text_of(one.story)) != _hash_of(one)
