@@ -28,8 +28,7 @@ SILENT = 120.0
 """After this time (s) without a byte a client loses its session to another, if there are 32."""
 
 MOST_OF_SESSION = 16
-MOST_OF_PLACE = 64
-"""Most commands that wait, of one session and of all."""
+"""Most commands of a session that wait. All have this many: none fills the place of another."""
 
 
 class EipSessions:
@@ -80,7 +79,7 @@ class EipSessions:
                 ) -> Iterator[PcccCommand]:
         """Take bytes of a client that came after ``came``; yield commands that cannot wait."""
         for command in session.receive(data, now, came):
-            if len(session.waiting) >= MOST_OF_SESSION or self.waiting >= MOST_OF_PLACE:
+            if len(session.waiting) >= MOST_OF_SESSION:
                 yield command
                 continue
             session.waiting.append(command)
