@@ -55,7 +55,7 @@ _NO_BYTES = re.compile(
 CLOSED = re.compile(r'[\s,;\])}>"\'|/*\\□]*')
 _NAME = re.compile(r'[^\W\d_]{2}')
 _LONG_NUMBER = re.compile(r'(?<!\w)(?=[A-Fa-f]*\d)[0-9A-Fa-f]{2,}(?!\w)')
-_CUT = re.compile(r'[0-9A-Fa-f]{2}\s?(?:…|\.{3}(?!\.))')
+_CUT = re.compile(r'(?:[0-9A-Fa-f]{2}\s?|["\'])(?:…|\.{3}(?!\.))')
 _ANY = re.compile(r'(?<!\w)(?:0[xX])?[0-9A-Fa-f]*\d[0-9A-Fa-f]*(?!\w)')
 _GAP = re.compile(r'\s{2,}|\t|\s?[|;]\s?|\s|\Z')
 _WIDE = re.compile(r'\s{2,}|\t|\s?[|;]')

@@ -164,6 +164,8 @@ def _literal(line: str) -> Run | None:
             break
         if _PAIRS_AFTER.fullmatch(line, match.end()):
             raise ValueError('bytes after a text')
+        if line.startswith('...', match.end()):
+            raise ValueError('a text is cut')
         is_last = not re.search(r'[\w"\']', line[match.end():match.end() + 60])
         if match['mark'] or '\\' in match['text'] or is_last:
             if found is not None:

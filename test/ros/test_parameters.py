@@ -42,6 +42,7 @@ from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from support.ros import ros_args, write_csv
+import yaml
 
 MAP = ['recipe,ReadWrite,N7:10,2,SLC,4,0,999', 'line/door,Read,I:017/12,1,PLC5,,,']
 MAP_HEADER = 'Tag,Command,Address,Station,PLC_Type,Length,Min,Max'
@@ -407,6 +408,26 @@ def test_parameter_file_sets_parameters_of_node_and_net(
     assert configuration.parameters.default_period == 250
     assert configuration.parameters.stale_after == 4.0
     assert configuration.network == Network(baud=38400, com_port='3', handshake=True, parity='Odd')
+
+
+def test_file_of_all_parameters_starts_the_same_bridge(
+        make_node: Nodes, files: Files, tmp_path: Path) -> None:
+    """Write what "ros2 param dump" does."""
+    node = make_node({**files, 'default_period': 250, 'poll_list': '1,2', 'net.baud': 38400})
+    first = configure(node)
+    ShownFiles(node).show(first.network, first.mappings)
+    dumped: dict[str, Any] = {}
+    for name, parameter in node.get_parameters_by_prefix('').items():
+        *folders, last = name.split('.')
+        place = dumped
+        for folder in folders:
+            place = place.setdefault(folder, {})
+        place[last] = parameter.value
+    path = tmp_path / 'dumped.yaml'
+    path.write_text(yaml.safe_dump({'/parameters': {'ros__parameters': dumped}}), 'utf-8')
+    again = configure(make_node(cli_args=['--ros-args', '--params-file', str(path)]))
+    assert (again.network, [*map_cells(again.mappings)], again.parameters, again.ignored) == (
+        first.network, [*map_cells(first.mappings)], first.parameters, [])
 
 
 @pytest.mark.parametrize(('name', 'right'), [

@@ -123,6 +123,14 @@ def test_log_file_has_the_name_that_was_given(
     os.close(descriptor)
 
 
+def test_log_directory_that_is_missing_is_made(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv('ROS_LOG_DIR', str(tmp_path / 'a' / 'b'))
+    descriptor = cast(int, main.log_file('me', []))
+    assert Path(f'/proc/self/fd/{descriptor}').readlink().match(f'{tmp_path}/a/b/me_*.log')
+    os.close(descriptor)
+
+
 @pytest.mark.parametrize('directory', ['/proc/none', '/proc'])
 def test_unusable_log_directory_is_named(directory: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv('ROS_LOG_DIR', directory)

@@ -545,6 +545,27 @@ def test_other_texts_are_no_recordings(lines: list[str]) -> None:
         read(lines)
 
 
+# Lines of public reports, which test/lab/field.md names.
+@for_all(('lines', 'right'), [
+    (['uart_packet-1:    0.103 RX: AD 0C', 'uart_packet-1:    0.203 TX: 10 06'],
+     [(IN, b'\xAD\x0C'), (OUT, b'\x10\x06')]),
+    (['0000: 10 02 08 09  ¿.¿.', '0004: 10 03 b5 41  ..¿A'],
+     [(UNKNOWN, b'\x10\x02\x08\x09'), (UNKNOWN, b'\x10\x03\xB5A')]),
+    (["2024-01-28 10:00:00,103 DEBUG A: b'1005'", "2024-01-28 10:00:00,203 DEBUG B: b'1006'"],
+     [(OUT, b'\x10\x05'), (IN, b'\x10\x06')]),
+    (['1005' * 9], [(UNKNOWN, 9 * b'\x10\x05')])])
+def test_lines_of_public_reports_are_read(
+        lines: list[str], right: list[tuple[Direction, bytes]]) -> None:
+    assert [(chunk.direction, chunk.data) for chunk in read(lines)] == right
+
+
+@for_all('cut', [r'write(3, "\20\2\1\5"..., 58) = 58', r'write(3, "\x10\x02"..., 20) = 20'])
+@for_all('count', [1, 9])
+def test_text_that_strace_has_cut_is_refused(cut: str, count: int) -> None:
+    with pytest.raises(Problem, match=f'x:{count + 1}: the bytes are cut here'):
+        read([*[r'read(3, "\x10\x06", 9) = 2'] * count, cut])
+
+
 @for_all('encoding', ['utf-8-sig', 'utf-16', 'utf-16-le', 'utf-16-be', 'gb18030', 'latin-1'])
 def test_texts_come_in_any_encoding(encoding: str) -> None:
     with TemporaryDirectory() as folder:

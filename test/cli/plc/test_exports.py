@@ -343,6 +343,28 @@ def test_list_that_says_nothing_of_access_is_only_read(tmp_path: Path) -> None:
         'Client Access is empty: made Read rows': 1}
 
 
+# Lists of public reports, which test/lab/field.md names.
+@for_all(('text', 'rows'), [
+    ('name;type;memaddress;scaleMin\nSpeed;INT;N7:0;0\n', [('Speed', 'Read', 'N7:0', '')]),
+    ('Tag Name,Address\na,N7:0\nb,N7:0\n',
+     [('a', 'Read', 'N7:0', ''), ('b', 'Read', 'N7:0', '')]),
+    ('Tag Name,Address,Description\na,N7:0,"say ""stop"",\nthen go"\nb,N7:1,\n',
+     [('a', 'Read', 'N7:0', 'say "stop", then go'), ('b', 'Read', 'N7:1', '')])])
+def test_lists_of_public_reports_become_rows(
+        tmp_path: Path, text: str, rows: list[tuple[str, ...]]) -> None:
+    mappings, left_out = imported(tmp_path, text)
+    assert (told(mappings), left_out) == (rows, [])
+
+
+@for_all(('cell', 'cure'), [
+    ('"=""I:017"""', 'signs that only a spreadsheet needs: write I:017'),
+    ("'I:017", 'signs that only a spreadsheet needs: write I:017'), ('1F', 'as in N7:0')])
+def test_address_with_signs_of_a_spreadsheet_is_left_out(
+        tmp_path: Path, cell: str, cure: str) -> None:
+    mappings, (fault,) = imported(tmp_path, f'Tag Name,Address\na,{cell}\n')
+    assert not mappings and cure in fault
+
+
 def test_columns_of_a_list_are_given_by_options(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     source = tmp_path / 'list.csv'
