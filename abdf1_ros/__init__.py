@@ -28,8 +28,8 @@ repeats messages that get lost on the line:
         plc.write('B3:0/1', True)
         print(plc.identify())
 
-Its errors are in ``abdf1_ros.errors``. ``Client.from_files`` reads the two CSV files of the node;
-its client reads and writes by tag. For a machine use the node (``abdf1 node``, or ``ros2 run
+Its errors can be imported from here, too. ``Client.from_files`` reads the two CSV files of the
+node; its client reads and writes by tag. For a machine use the node (``abdf1 node``, or ``ros2 run
 abdf1_ros node``). The node makes topics of the rows of a map, polls the PLCs, and writes
 heartbeats and fallback values.
 
@@ -59,25 +59,30 @@ from __future__ import annotations
 TYPE_CHECKING = False  # mypy treats it as true; the import of the module typing is slow
 if TYPE_CHECKING:
     from abdf1_ros.client import Client  # noqa: I300
+    from abdf1_ros.errors import Abdf1Error, FormatError, LinkError, PortLost, RemoteError
+    from abdf1_ros.problems import ConfigurationError
     from abdf1_ros.readings import Reading
+    from abdf1_ros.tagged_client import TaggedClient
 
     __version__: str
 
-__all__ = ['Client', 'Reading', '__version__']
+__all__ = ['Abdf1Error', 'Client', 'ConfigurationError', 'FormatError', 'LinkError', 'PortLost',
+           'Reading', 'RemoteError', 'TaggedClient', '__version__']
+
+# The modules of these names; the others are errors.
+_HOMES = {'Client': 'client', 'ConfigurationError': 'problems', 'Reading': 'readings',
+          'TaggedClient': 'tagged_client'}
 
 
 def __getattr__(name: str) -> object:
     """Return a class, which imports pyserial, or the version: each only when it is used."""
-    if name == 'Client':
-        from abdf1_ros.client import Client
-        return Client
-    if name == 'Reading':
-        from abdf1_ros.readings import Reading
-        return Reading
     if name == '__version__':
         from abdf1_ros.paths import package_version
         return package_version()
-    raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
+    if name not in __all__:
+        raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
+    from importlib import import_module
+    return getattr(import_module(f'{__name__}.{_HOMES.get(name, "errors")}'), name)
 
 
 def __dir__() -> list[str]:

@@ -38,6 +38,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+import math
 import os
 import signal
 import sys
@@ -186,6 +187,17 @@ def run(node: CommandWriter, options: argparse.Namespace) -> int:
     return max(statuses)
 
 
+def seconds(text: str) -> float:
+    """Return a time above 0 s."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f'"{text}" should be a number of seconds above 0')
+    return value
+
+
 def main() -> int:
     """Parse the arguments and write."""
     parser = argparse.ArgumentParser(
@@ -197,7 +209,7 @@ def main() -> int:
     parser.add_argument('--tags', nargs='+', help='tags of the mappings (default: the topic)')
     parser.add_argument('--station', type=int,
                         help='write only while ROS is in control of this station')
-    parser.add_argument('--timeout', type=float, default=6.0,
+    parser.add_argument('--timeout', type=seconds, default=6.0,
                         help='seconds to wait for the bridge, then for the result; longer than '
                              'twice the write_timeout of the bridge, which may read back a write '
                              '(default: %(default)g)')

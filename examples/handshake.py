@@ -47,6 +47,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable
 from enum import Enum
+import math
 import signal
 import sys
 import time
@@ -234,16 +235,27 @@ class Handshake(Node):
         return condition()
 
 
+def seconds(text: str) -> float:
+    """Return a time above 0 s."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f'"{text}" should be a number of seconds above 0')
+    return value
+
+
 def main() -> int:
     """Parse the arguments and let one job be done."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--node', default='/abdf1', help='the bridge (default: %(default)s)')
-    parser.add_argument('--begin-within', type=float, default=5.0, metavar='S',
+    parser.add_argument('--begin-within', type=seconds, default=5.0, metavar='S',
                         help='the PLC has to begin within this time (s) (default: %(default)g)')
-    parser.add_argument('--done-within', type=float, default=60.0, metavar='S',
+    parser.add_argument('--done-within', type=seconds, default=60.0, metavar='S',
                         help='the job has to be done within this time (s) (default: %(default)g)')
-    parser.add_argument('--patience', type=float, default=2.0, metavar='S',
+    parser.add_argument('--patience', type=seconds, default=2.0, metavar='S',
                         help='the bridge has to publish each topic within this time (s) again; '
                         'at least the stale time that check prints (default: %(default)g)')
     parser.add_argument('--control', default='', metavar='TAG',

@@ -82,6 +82,17 @@ def log(options: argparse.Namespace) -> None:
                 or time.monotonic() >= end
 
 
+def seconds(text: str) -> float:
+    """Return a time above 0 s."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f'"{text}" should be a number of seconds above 0')
+    return value
+
+
 def main() -> int:
     """Log as the arguments say; return the exit status."""
     parser = argparse.ArgumentParser(
@@ -90,9 +101,9 @@ def main() -> int:
     parser.add_argument('net_file', help='net CSV of the line')
     parser.add_argument('map_file', help='map CSV; its Read and ReadWrite rows are logged')
     parser.add_argument('database', help='file of SQLite; it is continued if it exists')
-    parser.add_argument('--every', type=float, default=1.0, metavar='S',
+    parser.add_argument('--every', type=seconds, default=1.0, metavar='S',
                         help='seconds from round to round (default: %(default)g)')
-    parser.add_argument('--seconds', type=float, default=math.inf, help='end after this time')
+    parser.add_argument('--seconds', type=seconds, default=math.inf, help='end after this time')
     options = parser.parse_args()
     signal.pthread_sigmask(signal.SIG_BLOCK, _ENDS)  # they wait for the end of a round
     try:

@@ -119,6 +119,17 @@ def record(node: Recorder, seconds: float, wait: float, ended: list[int]) -> boo
     return True
 
 
+def seconds(text: str) -> float:
+    """Return a time above 0 s."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f'"{text}" should be a number of seconds above 0')
+    return value
+
+
 def main() -> int:
     """Record until Ctrl-C, SIGTERM or --seconds."""
     parser = argparse.ArgumentParser(
@@ -126,9 +137,9 @@ def main() -> int:
         formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('file', help='CSV file to write; must not exist yet')
     parser.add_argument('--node', default='/abdf1', help='the bridge (default: %(default)s)')
-    parser.add_argument('--seconds', type=float, default=math.inf,
+    parser.add_argument('--seconds', type=seconds, default=math.inf,
                         help='end this many seconds after the bridge was found')
-    parser.add_argument('--wait', type=float, default=10.0,
+    parser.add_argument('--wait', type=seconds, default=10.0,
                         help='seconds to look for the bridge (default: %(default)g)')
     options = parser.parse_args(remove_ros_args(sys.argv)[1:])
     # With rclpy's own handlers the file would not be closed cleanly.

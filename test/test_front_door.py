@@ -21,7 +21,10 @@ import textwrap
 
 import abdf1_ros
 from abdf1_ros.client import Client
+from abdf1_ros.errors import Abdf1Error, FormatError, LinkError, PortLost, RemoteError
 from abdf1_ros.paths import package_version
+from abdf1_ros.problems import ConfigurationError
+from abdf1_ros.tagged_client import TaggedClient
 import pytest
 from support.cases import for_all
 from support.driver_bench import simulated_plc, stored
@@ -63,6 +66,13 @@ def test_names_of_the_package() -> None:
     assert abdf1_ros.Client is Client
     assert abdf1_ros.__version__ == package_version()
     assert {*abdf1_ros.__all__} <= {*dir(abdf1_ros)}
+    shown = {name: getattr(abdf1_ros, name) for name in abdf1_ros.__all__}
+    errors = {error for error in shown.values()
+              if isinstance(error, type) and issubclass(error, Exception)}
+    assert errors == {Abdf1Error, ConfigurationError, FormatError, LinkError, PortLost,
+                      RemoteError}
+    assert all(issubclass(error, abdf1_ros.Abdf1Error) for error in errors)
+    assert abdf1_ros.TaggedClient is TaggedClient
     with pytest.raises(AttributeError, match='Clients'):
         abdf1_ros.Clients  # noqa: B018
 

@@ -131,11 +131,10 @@ def _open_standard_streams() -> None:
 
 
 def _cure(module: str) -> str:
-    if module == 'serial':
-        return '"pip install pyserial", or "make setup" in a checkout'
-    if module.startswith('serial.'):
-        return 'serial is of another package: "pip uninstall serial", then "pip install pyserial"'
-    return 'is ROS 2 sourced, as by ". /opt/ros/jazzy/setup.bash"?'
+    if module.partition('.')[0] != 'serial':
+        return 'is ROS 2 sourced, as by ". /opt/ros/jazzy/setup.bash"?'
+    from abdf1_ros.ports import cure_of
+    return cure_of(module)
 
 
 def _ended(status: int) -> int:

@@ -22,3 +22,16 @@ listens, and ``endpoints`` makes ends of lines.
 
 There is no protocol here: a machine of ``df1`` gets the bytes and the time.
 """
+
+from __future__ import annotations
+
+import sys
+
+
+def cure_of(module: str) -> str:
+    """Return how to get a missing module of pyserial."""
+    if module == 'serial':
+        return '"pip install pyserial", or "make setup" in a checkout'
+    other = getattr(sys.modules.get('serial'), '__file__', None) or 'another package'
+    return (f'{other} is imported as serial, and is not pyserial. Rename it if it is yours; else '
+            '"pip uninstall serial", then "pip install pyserial"')

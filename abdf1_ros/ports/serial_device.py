@@ -34,12 +34,19 @@ from typing import TypeVar
 
 from abdf1_ros.df1.frames import Damaged
 from abdf1_ros.line_names import device_of, number_of
+from abdf1_ros.ports import cure_of
 from abdf1_ros.ports.descriptor import DescriptorPort, NO_DATA_TAKEN, WRITE_TIMEOUT
 from abdf1_ros.ports.ownership import BUSY, own
 from abdf1_ros.ports.repeated_ends import has_often_ended, OFTEN
 from abdf1_ros.ports.settings import Lack, PortSettings
-import serial
-from serial.serialutil import SerialException  # another package named serial lacks it
+
+try:
+    import serial
+    from serial.serialutil import SerialException  # another package named serial lacks it
+except ModuleNotFoundError as error:
+    lacking = error.name or 'serial'
+    raise ModuleNotFoundError(
+        f'the Python module {lacking} is missing; {cure_of(lacking)}', name=lacking) from None
 
 # Our own texts for errors whose system text says too little.
 NOT_SERIAL = 'this is not a serial port'

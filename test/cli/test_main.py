@@ -169,8 +169,8 @@ def test_process_with_threads_of_rclpy_or_pyserial_ends_at_once() -> None:
 @pytest.mark.parametrize(('name', 'module', 'cure'), [
     ('node', 'rclpy', 'is ROS 2 sourced, as by ". /opt/ros/jazzy/setup.bash"?'),
     ('plc', 'serial', '"pip install pyserial", or "make setup" in a checkout'),
-    ('plc', 'serial.serialutil', 'serial is of another package: "pip uninstall serial", then "pip '
-                                 'install pyserial"')])
+    ('plc', 'serial.serialutil', 'another package is imported as serial, and is not pyserial. '
+     'Rename it if it is yours; else "pip uninstall serial", then "pip install pyserial"')])
 def test_module_that_is_missing_is_named(
         tmp_path: Path, name: str, module: str, cure: str) -> None:
     text = f"raise ModuleNotFoundError('no', name='{module}')\n"
@@ -178,6 +178,19 @@ def test_module_that_is_missing_is_named(
         _, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 2
     assert errors == f'-c: the Python module {module} is missing; {cure}\n'
+
+
+def test_program_is_told_which_file_hides_pyserial(tmp_path: Path) -> None:
+    for text, right in (
+            ('', f'{tmp_path}/serial.py is imported as serial, and is not pyserial. Rename it'),
+            ("raise ModuleNotFoundError('no', name='serial')", '"pip install pyserial", or ')):
+        (tmp_path / 'serial.py').write_text(text)
+        done = subprocess.run(
+            [sys.executable, '-c', 'from abdf1_ros import Client'], check=False, text=True,
+            capture_output=True, timeout=PATIENCE, env=os.environ | {'PYTHONPATH': str(tmp_path)})
+        last = done.stderr.splitlines()[-1]
+        assert last.startswith('ModuleNotFoundError: the Python module serial')
+        assert right in last
 
 
 @pytest.mark.parametrize('name', ['node', 'lines', 'monitor', 'demo'])

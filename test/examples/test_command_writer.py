@@ -14,6 +14,7 @@
 
 """The command writer, against a bridge with a simulator and against one that only listens."""
 
+import argparse
 from collections.abc import Callable, Iterator
 import runpy
 import sys
@@ -95,6 +96,16 @@ def test_client_of_a_discovery_server_is_told_what_it_lacks(
     assert hint() == graph_hint() == '; ROS_DISCOVERY_SERVER is set: set ROS_SUPER_CLIENT=TRUE too'
     monkeypatch.setenv('ROS_SUPER_CLIENT', 'TRUE')
     assert not hint()
+
+
+@pytest.mark.parametrize('name', [
+    'command_writer', 'handshake', 'interlock_consumer', 'night', 'recorder'])
+def test_examples_wait_for_a_time_that_ends(name: str) -> None:
+    seconds = runpy.run_path(str(EXAMPLE.with_stem(name)))['seconds']
+    assert seconds('0.5') == 0.5
+    for text in 'nan', 'inf', '-1', '0', 'x':
+        with pytest.raises(argparse.ArgumentTypeError, match=f'"{text}" should be a number of'):
+            seconds(text)
 
 
 @pytest.mark.parametrize(('words', 'text'), [

@@ -109,7 +109,9 @@ def test_silent_plc_is_a_gap_of_its_own_rows(files: list[str], plcs: list[Simula
 
 def test_end_and_failures_have_their_status(files: list[str], tmp_path: Path) -> None:
     for words, status, said in (
-            ([*files, '--seconds', '0'], 0, ''),
+            ([*files, '--seconds', '0.001'], 0, ''),
+            ([*files, '--seconds', 'nan'], 2, '"nan" should be a number of seconds above 0'),
+            ([*files, '--every', '-1'], 2, '"-1" should be a number of seconds above 0'),
             ([*files[:2], str(tmp_path)], 1, f'{tmp_path}: unable to open database file'),
             ([files[0], files[0], files[2]], 2, 'net.csv:1'),
             (['none.csv', *files[1:]], 2, 'none.csv')):

@@ -583,6 +583,8 @@ def test_two_topics_that_remaps_give_one_name_are_told_at_the_start(
 @pytest.mark.parametrize(('arguments', 'expected'), [
     (['--ros-args', '-r', '__node:=a-b'], 'a node name has letters, digits and underscores; '),
     (['--ros-args', '-p', 'net_file=net.csv'], 'a parameter is NAME:=VALUE, with a colon; '),
+    (['--ros-args', '-p', 'net_file:='],
+     "a parameter has no value; for an empty text write NAME:=''; "),
     (['--ros-args', 'net_file:=x'], '-p is missing before '),
     (['--ros-args', '-p', 'net.share:=[pty:/tmp/a]'],
      'put quotes around a text with [ or :; '),
@@ -598,8 +600,8 @@ def test_two_topics_that_remaps_give_one_name_are_told_at_the_start(
     (['--ros-args', '-r', f'__ns:=/{240 * "n"}'], ''),
     (['--ros-args', '-r', f'__ns:=/{300 * "n"}'], ''),
     (['--ros-args', '-r', f'__node:={256 * "n"}'], '')],
-    ids=['remap', 'colon', 'bare', 'list', 'help', 'namespace', 'slashes', 'end', 'bare_name',
-         'parameter', 'unknown', 'topic', 'long', 'name'])
+    ids=['remap', 'colon', 'empty', 'bare', 'list', 'help', 'namespace', 'slashes', 'end',
+         'bare_name', 'parameter', 'unknown', 'topic', 'long', 'name'])
 def test_unusable_arguments_are_told_in_one_line(
         refusal: Callable[..., list[str]], arguments: list[str], expected: str) -> None:
     """What follows our words is a text of rcl, which differs between versions of ROS."""

@@ -74,6 +74,8 @@ _BAD_ARGUMENTS = re.compile("Couldn't parse|should not exceed|invalid node names
 _ADVICE = (
     (r"^\['(?:__|~|/)[^']*:=", '-r is missing before '),
     (r"^\['[^']*:=", '-p is missing before '),
+    (r"parameter override rule: '-p [\w.]+:='",
+     "a parameter has no value; for an empty text write NAME:=''; "),
     (r"parameter override rule: '-p \w+=", 'a parameter is NAME:=VALUE, with a colon; '),
     (r"override rule: '-p [\w.]+:=\[", 'put quotes around a text with [ or :; '),
     (r"^\['--?[hv]", 'write this before --ros-args: '),
