@@ -123,6 +123,11 @@ class Traces:
         """Return the station of this line that was asked: the gateway, if there is one."""
         return self.station if self.gateway is None else self.gateway
 
+    @property
+    def has_other_user(self) -> bool:
+        """Return True if another program uses the line: a master, or a device on a splitter."""
+        return bool(self.masters) or self.foreign is not None and self.mode.has_one_plc
+
     def is_of(self, station: int | None) -> bool:
         """Return True if a symbol to or from a station of the line belongs to the station."""
         return not self.mode.is_master or station in (None, self.on_line)

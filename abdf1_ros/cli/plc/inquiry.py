@@ -68,7 +68,7 @@ class Judged(Protocol):
 
 
 def conclude(session: Judged, neighbours: Neighbours = tuple) -> None:
-    """Tell the cause if a station gave no reply, or of another master; the session has ended."""
+    """Tell the cause if a station gave no reply, or of another user; the session has ended."""
     network = session.network
     if session.silent is not None:
         examination = Examination(session, session.silent, neighbours)
@@ -76,7 +76,7 @@ def conclude(session: Judged, neighbours: Neighbours = tuple) -> None:
         complain(str(examination.cause()))
         then = ', '.join(question.value for question in examination.asked)
         complain(f'{facts}; then asked: {then}' if then else facts)
-    elif network.line_mode.is_master and (heard := session.traces(network.station)).masters:
+    elif (heard := session.traces(network.station)).has_other_user:
         complain(str(diagnose(heard)))
 
 

@@ -282,6 +282,12 @@ def test_replies_to_another_device_on_a_splitter_are_named(tmp_path: Path,
     with far_end(tmp_path / 'line', says_by_itself(foreign)) as name:
         said = call(main, capsys, *READ, '--peer', '--port', name, *quick(tmp_path))
     assert cause(said).startswith('replies to number 0 come, to commands that are not ours: a sec')
+    device = OddDevice(Wiring.FULL)
+    device.say = lambda data: data + foreign if b'\x10\x02' in data else data
+    with odd_line(tmp_path / 'other', device) as name:
+        said = call(main, capsys, *READ, '--peer', '--port', name)
+    assert said.status == 0  # the value has come all the same
+    assert cause(said).startswith('replies to number 0 come, to commands that are not ours: a sec')
 
 
 class Master:
