@@ -241,10 +241,13 @@ def _takes_other_check(traces: Mapping[LineSettings, Traces],
     return False if is_refused else traces[settings].takes_other_check
 
 
-def only_heard(master: ForeignMaster | None, what: str) -> int:
-    """Print the ways to use a line of another master; return the status."""
-    complain(what if master is None else (
-        f'{master}: nothing was sent. If the master polls a station N that no PLC has, '
-        '"plc read --slave --own-station N" can ask PLCs through it, like a node of Mode Slave; '
-        f'"sniff" shows what the master reads; {what}'))
+def only_heard(network: Network, master: ForeignMaster | None, what: str) -> int:
+    """Print ``what`` came of listening, and the ways to ask beside a master; return the status."""
+    if master is None:
+        complain(what)
+        return EXIT_FAILED
+    complain(f'{master}: nothing was sent. {what}')
+    complain(f'"sniff --port {network.port} --baud {master.baud}" shows what the master reads. '
+             '"plc read N7:0 --slave --own-station N" asks through the master, if it polls a '
+             'number N that no PLC has')
     return EXIT_FAILED

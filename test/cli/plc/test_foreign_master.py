@@ -120,8 +120,13 @@ def test_line_that_has_a_master_is_only_listened_to(
         assert main([command, '--port', port, *into]) == 1
         assert master.heard == b''
     assert progress.return_value.mock_calls[-1] == call.clear()  # before it is told
-    assert capsys.readouterr().err.splitlines()[-1].startswith(
-        'plc: another master polls stations 1, 3, 7, 19200 baud, check unknown: nothing was sent.')
+    what = 'Next: "plc init" writes net.csv and map.csv for Mode Listen' \
+        if command == 'detect' else 'No read with its reply was heard, so no file was written'
+    assert capsys.readouterr().err.splitlines()[-2:] == [
+        'plc: another master polls stations 1, 3, 7, 19200 baud, check unknown: nothing was sent. '
+        f'{what}',
+        f'plc: "sniff --port {port} --baud 19200" shows what the master reads. "plc read N7:0 '
+        '--slave --own-station N" asks through the master, if it polls a number N that no PLC has']
     assert not (tmp_path / 'new').exists()
 
 
@@ -215,7 +220,7 @@ def test_init_offers_a_map_of_what_another_master_reads(
     assert not select.select([line.fileno()], [], [], 0.1)[0]
     # By the files themselves, as a full-duplex line needs: they name both ports.
     assert main(['init', '--net', str(new / 'net.csv'), '--into', str(tmp_path / 'again')]) == 1
-    assert 'no read with its reply was heard, so no file was written' in capsys.readouterr().err
+    assert 'No read with its reply was heard, so no file was written' in capsys.readouterr().err
     line.close()
 
 
@@ -238,7 +243,7 @@ def test_files_of_a_line_that_is_heard_have_its_speed_and_its_check_if_that_is_k
         f'next: {called("check")} {net} {rows}']
     assert Path(net).read_text('utf-8').splitlines()[1] == f'Listen,{right},/dev/x,,1200,Even'
     assert main(['init', '--port', 'rfc2217://x:1', '--into', str(tmp_path / 'far')]) == 1
-    assert 'Mode Listen works with socket:// or a device, not with' in capsys.readouterr().err
+    assert 'Mode Listen works with a device or socket://, not with' in capsys.readouterr().err
     assert [(line.mode, line.baud, line.error_code) for line in heard] == [('Listen', 1200, right)]
 
 

@@ -53,7 +53,8 @@ def run(options: argparse.Namespace) -> int:
     network = network_of(options, timeout=DETECT_DEFAULTS.timeout)
     found = found_settings(options, network)
     if isinstance(found, overhear.ForeignMaster):
-        return only_heard(found, '"plc init" writes net.csv and map.csv for Mode Listen')
+        return only_heard(
+            network, found, 'Next: "plc init" writes net.csv and map.csv for Mode Listen')
     if found is None:
         return EXIT_FAILED
     there = found.presence

@@ -101,15 +101,16 @@ def _init_listening(network: Network, master: overhear.ForeignMaster | None,
         check = network.error_code if master.check is None else master.check.value
         network = replace(overhear.silent(network), baud=master.baud, error_code=check)
         if not network.line_mode.only_listens:
-            return only_heard(
-                master, 'Mode Listen works with socket:// or a device, not with rfc2217://')
+            return only_heard(network, master, 'Mode Listen works with a device or socket://, not '
+                                               'with rfc2217://, so no file was written')
         print(f'{master}: we send nothing')
     progress = Progress()
     progress.show(f'listening for {overhear.LISTENED_FOR_READS:.0f} s')
     reads = overhear.heard_reads(network, overhear.LISTENED_FOR_READS)
     progress.clear()
     if not reads:
-        return only_heard(master, 'no read with its reply was heard, so no file was written')
+        return only_heard(
+            network, master, 'No read with its reply was heard, so no file was written')
     for text in texts_of(reads):
         print(text)
     target.write(init.listening_csv(network), map_of(reads))
