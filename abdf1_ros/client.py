@@ -90,8 +90,7 @@ Whole = Literal['int16', 'uint16', 'int32', 'uint32', 'bcd16', 'bcd12']
 
 _IN_PYTHON = (
     (re.compile(r', and Length (\d+)'), r', length=\1'), (re.compile('own row'), 'own address'),
-    (re.compile('a row each'), 'an address each'),
-    (re.compile('in the column Processor'), 'by processor='))
+    (re.compile('a row each'), 'an address each'))
 """Words of errors about a map, and the words about a call in their place."""
 
 _T = TypeVar('_T')

@@ -107,7 +107,7 @@ def words_in(reply: Packet, start: Address, words: int, dialect: Dialect) -> byt
     except RemoteError as error:
         if error.sts == STS_ILLEGAL_COMMAND and words > dialect.sure_read(start.file_type):
             raise RemoteError(error.sts, error.ext_sts, f'{error}, or too many words at once for '
-                              'this processor: name it in the column Processor') from None
+                              'this processor: give its name as Processor') from None
         raise
     return dialect.read_data(start, words, data)
 

@@ -191,11 +191,11 @@ def test_plc5_with_a_fault_is_asked_which(answer: Packet, fault: str) -> None:
     assert identity.faults == (fault,)
 
 
-def test_refusal_of_a_long_read_names_the_column_that_makes_it_shorter() -> None:
+def test_refusal_of_a_long_read_names_the_setting_that_makes_it_shorter() -> None:
     for length, hint in ((42, True), (41, False)):
         with pytest.raises(RemoteError) as caught:
             words_in(reply(sts=0x10), parse_address('N7:0', PlcType.SLC), length, SlcDialect())
-        assert str(caught.value).endswith('name it in the column Processor') is hint
+        assert str(caught.value).endswith('give its name as Processor') is hint
 
 
 MODES = {'Message': {}, 'Standard': {'polling': 'Standard'}, 'Peer': {'mode': 'Peer'},
