@@ -93,8 +93,8 @@ RULES = (
     Rule('printable text, and nothing else',
          lambda t: t.is_text,
          'text comes, and no DF1: the channel of the PLC is in User (ASCII) mode, or the far end '
-         'is a reader, a scale, a modem or a login prompt',
-         'set the channel to DF1, or find the right cable',
+         'is a reader, a scale, a modem, a login prompt or a web page',
+         'set the channel to DF1, or find the right cable or TCP port',
          Traces(characters=13, first=b'TEMP 23.4 C\r\n')),
     Rule('replies to our commands, with another number in place of ours',
          lambda t: t.other_number is not None and t.gateway is None,
@@ -107,6 +107,18 @@ RULES = (
          'replies to number {t.foreign} come, to commands that are not ours: a second device has '
          'the same port, by a passive splitter',
          'take it off; it may use Share', Traces(PEER, foreign=0)),
+    Rule('replies from another number than that of the station',
+         lambda t: t.other_source is not None and not t.replies,
+         'replies come from number {t.other_source}, in place of {t.station}',
+         '--station {t.other_source}, if that is the PLC; if {t.station} is a gateway, --via '
+         '{t.station} --station {t.other_source}',
+         Traces(station=2, acks=1, polls=9, polls_answered=9, other_source=3)),
+    Rule('replies of the station, to commands that we have not sent',
+         lambda t: t.strays > 0 and not t.replies and not t.late,
+         'replies of station {t.station} come, and none is to a command of ours: another program '
+         'asks with our number, {t.own}, or something on the way has kept old replies',
+         'end the other program; switch the device server or modem on the way off and on',
+         Traces(PEER, acks=1, strays=1)),
     Rule('half duplex: polls are answered; commands are, but only with another check',
          lambda t: t.mode.is_master and t.takes_other_check is True,
          'station {t.on_line} answers polls, and takes commands with {t.other_check} only',
@@ -127,10 +139,10 @@ RULES = (
          lambda t: t.swallowed == b'\xFF',
          'byte FF hex does not pass: a telnet port is on the way, as of a device server',
          'use its raw TCP port', Traces(damaged=2, swallowed=b'\xFF')),
-    Rule('replies of the station, each with a wrong check',
+    Rule('replies of the station, none of them whole',
          lambda t: t.is_garbled and not t.replies,
-         'station {t.station} replies, but each reply has a wrong check: something on the way '
-         'changes bytes',
+         'station {t.station} replies, but each reply has a wrong check or breaks off: something '
+         'on the way changes or drops bytes',
          'look for flow control, a telnet port and long messages, then for noise',
          Traces(damaged=4, is_garbled=True), Decider.ECHOES),
     Rule('half duplex: DLE NAK, which no slave sends',
@@ -238,6 +250,12 @@ RULES = (
          'or a station that was not asked (a PLC-5 shows its own in octal)',
          'look at the cable, then give other numbers with --stations', Traces(settings=32),
          is_of_all=True),
+    Rule('full duplex: DLE ENQ again and again, and no message',
+         lambda t: t.asked_again > 1,
+         'DLE ENQ comes again and again, and no message: the far end speaks DF1, and waits for '
+         'an answer that it does not get',
+         'check the cable: is our TX connected to its RX?',
+         Traces(PEER, asked_again=40, characters=80, first=b'\x10\x05\x10\x05', unasked=10)),
     Rule('bytes that came before we sent anything, and no DF1',
          lambda t: t.unasked > 0,
          'bytes come by themselves, and are no DF1: noise on a line that is open, without ground '
@@ -245,8 +263,8 @@ RULES = (
          _NOISE, Traces(unasked=40, characters=90, first=b'\xA7\x01')),
     Rule('bytes, and no DF1',
          lambda t: t.characters > 0,
-         '{t.characters} characters came, and no answer that makes sense: another baud rate or '
-         'parity, noise, or another protocol',
+         '{t.came}, and no answer that makes sense: another baud rate or parity, noise, or '
+         'another protocol',
          _OTHER_SETTINGS, Traces(characters=30, first=b'\xA7\x01')),
     Rule('half duplex: nothing, not from another station either',
          lambda t: t.mode.is_master and t.neighbour_answers is False,

@@ -26,10 +26,11 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import ENQ, SOH
 from abdf1_ros.df1.master import MASTER
 from abdf1_ros.df1.mode import LineMode
+from abdf1_ros.df1.packet import Packet
 from abdf1_ros.sniffer.capture import Chunk, Direction
 from abdf1_ros.sniffer.entries import Entry, Kind, Mark
 from abdf1_ros.sniffer.traffic import TrafficDecoder
-from abdf1_ros.text import printable
+from abdf1_ros.text import counted, printable
 
 # Number of polls and messages that show another master. One is not enough: after DLE ENQ, one of
 # 256 random byte pairs has a right BCC.
@@ -40,7 +41,7 @@ MOST_FIRST = 256
 
 _SHOWN_BYTES = 16
 _LEAST_TEXT = 5  # characters; fewer may be noise
-_TEXT = re.compile(rb'[\t\r\n -~]+')
+_TEXT = re.compile(rb'[\x02\x03\t\r\n -~]+')  # also in STX and ETX, as readers and scales send it
 
 # Functions of Modbus that devices use, and the same as exceptions.
 _MODBUS_FUNCTIONS = frozenset(one | bit for one in (1, 2, 3, 4, 5, 6, 15, 16) for bit in (0, 0x80))
@@ -67,6 +68,9 @@ class Traces:
     - ``masters``: stations that another master polls; ``foreign_polls``: how often.
     - ``foreign``: the number to which replies come that we have not asked for, None for none.
     - ``other_number``: the number to which our replies come in place of ours, None for ours.
+    - ``other_source``: the number from which replies come in place of the station's, None for its.
+    - ``strays``: whole replies of the station to commands that we have not sent.
+    - ``asked_again``: DLE ENQ of the far end, in full duplex.
     - ``echoes``: our own bytes come back. ``polled``: the master has polled us.
     - ``settings``: number of settings of the line that ``plc detect`` has tried, 0 for other
       commands; ``noisy``: with how many of them characters came.
@@ -104,6 +108,9 @@ class Traces:
     foreign_polls: int = 0
     foreign: int | None = None
     other_number: int | None = None
+    other_source: int | None = None
+    strays: int = 0
+    asked_again: int = 0
     echoes: bool = False
     polled: bool = False
     settings: int = 0
@@ -142,7 +149,12 @@ class Traces:
         """Return True if the far end has answered with symbols of DF1."""
         return bool(self.neighbour_answers) or sum((
             self.replies, self.acks, self.naks, self.enquiries, self.polls_answered,
-            self.naks_to_polls, self.foreign_polls)) > 0
+            self.naks_to_polls, self.foreign_polls, self.asked_again)) > 0
+
+    @property
+    def came(self) -> str:
+        """Return how many characters were received, as text."""
+        return f'{counted(self.characters, "character")} came'
 
     @property
     def is_text(self) -> bool:
@@ -200,6 +212,7 @@ class _SymbolCount:
         self._asked: Kind | None = None  # what we have sent last
         self._asked_station: int | None = None
         self._foreign: int | None = None
+        self._source: int | None = None
         self._late = 0.0
         decoder = TrafficDecoder(asked.check, asked.mode.duplex)
         first, unasked, characters, has_sent = b'', 0, 0, False
@@ -218,7 +231,7 @@ class _SymbolCount:
         has_masters = asked.mode.is_master and self._masters.total() >= SURE
         self.traces = replace(
             asked, characters=characters, first=first, unasked=unasked, late=self._late,
-            foreign=self._foreign, echoes=echoes,
+            foreign=self._foreign, other_source=self._source, echoes=echoes,
             polled=asked.mode.is_polled and asked.own in self._masters,
             masters=tuple(sorted(self._masters)) if has_masters else (),
             foreign_polls=self._masters.total(), **counts)
@@ -234,6 +247,7 @@ class _SymbolCount:
     def _hear(self, entry: Entry) -> None:
         kind, counts = entry.kind, self._counts
         counts['damaged'] += kind is Kind.DAMAGED
+        counts['asked_again'] += kind is Kind.ENQ and not self._of.mode.is_master
         is_masters = entry.wire.startswith((SOH, ENQ)) and entry.valid is True
         if is_masters and entry.station is not None:
             self._masters[entry.station] += 1
@@ -245,18 +259,27 @@ class _SymbolCount:
             to_what = 'enquiries' if self._asked is Kind.ENQ else 'naks_to_polls' \
                 if self._asked is Kind.POLL else 'acks' if kind is Kind.ACK else 'naks'
             counts[to_what] += 1
-        elif self._asked is Kind.POLL and kind in _ANSWERS_TO_POLL and not is_masters:
+        elif not is_masters and kind in _ANSWERS_TO_POLL and (
+                self._asked is Kind.POLL or kind is Kind.EOT and self._of.mode.is_master):
             counts['polls_answered'] += 1
 
     def _take_reply(self, entry: Entry) -> None:
         assert entry.packet is not None
-        if Mark.STRAY in entry.marks and entry.packet.dst != self._of.own:
-            self._foreign = entry.packet.dst
+        if Mark.STRAY in entry.marks:
+            self._take_stray(entry.packet)
         is_its = entry.packet.src == self._of.station or not self._of.mode.is_master
         if entry.latency is not None and is_its:
             is_late = entry.latency > self._cmd_timeout
             self._counts['replies'] += not is_late
             self._late = max(self._late, entry.latency if is_late else 0.0)
+
+    def _take_stray(self, reply: Packet) -> None:
+        if reply.dst != self._of.own:
+            self._foreign = reply.dst
+        elif reply.src == self._of.station:
+            self._counts['strays'] += 1
+        elif self._of.is_of(self._asked_station):
+            self._source = reply.src
 
 
 def without_echo(chunks: Iterable[Chunk]) -> Iterator[Chunk]:

@@ -104,6 +104,35 @@ def test_replies_that_are_not_for_us_are_foreign() -> None:
     assert seen(('>', frame(COMMAND)), ('<', ACK), ('<', frame(REPLY)), mode=PEER).foreign is None
 
 
+def test_replies_from_another_number_or_to_other_commands_are_told_as_such() -> None:
+    half = ('>', frame(COMMAND, 1)), ('<', ACK), ('>', poll(1))
+    of_3 = bytes.fromhex('05 03 46 00 21 00')
+    found = seen(*half, ('<', frame(of_3)))
+    assert names(found, 'other_source', 'strays', 'replies') == (3, 0, 0)
+    assert '--station 3' in diagnose(found).step
+    other = seen(*half, ('>', poll(2)), ('<', frame(of_3)))
+    assert other.other_source is None  # station 2 was polled
+    old = bytes.fromhex('05 01 46 00 20 00')
+    found = seen(('>', frame(COMMAND)), ('<', ACK), ('<', frame(old)), mode=PEER)
+    assert names(found, 'other_source', 'strays', 'replies') == (None, 1, 0)
+    assert 'none is to a command of ours' in diagnose(found).cause
+    both = seen(*half, ('<', frame(old)), ('<', frame(REPLY)))
+    assert names(both, 'strays', 'replies') == (1, 1)
+    assert 'none is to' not in diagnose(both).cause
+
+
+def test_symbols_alone_are_df1() -> None:
+    storm = seen(*[('<', ENQ)] * 3, ('>', frame(COMMAND)), ('<', ENQ), ('>', NAK), mode=PEER)
+    assert storm.is_df1 and storm.asked_again == 4
+    assert 'DLE ENQ comes again and again' in diagnose(storm).cause
+    only_eot = seen(('>', frame(COMMAND, 1)), ('<', EOT), ('>', frame(COMMAND, 1)), ('<', EOT))
+    assert only_eot.is_df1 and diagnose(only_eot).rule.asks is Decider.OTHER_CHECK
+
+
+def test_characters_are_counted_in_words() -> None:
+    assert diagnose(Traces(characters=1, first=b'\xA7')).cause.startswith('1 character came, ')
+
+
 def test_damaged_messages_that_fit_the_other_check_show_it() -> None:
     as_bcc = frame(REPLY)[:-2] + bytes((-sum(REPLY) & 0xFF,))
     line = ('>', frame(COMMAND)), ('<', as_bcc), ('>', NAK), ('<', as_bcc), ('>', NAK)
@@ -122,7 +151,8 @@ def test_own_bytes_that_come_back_are_left_out() -> None:
 
 
 @for_all(('data', 'is_text', 'is_modbus'), [
-    (b'TEMP 23.4 C\r\n', True, False), (b'login: ', True, False), (b'OK\r\n', False, False),
+    (b'TEMP 23.4 C\r\n', True, False), (b'login: ', True, False),
+    (b'\x024006381333931\x03\r\n', True, False), (b'OK\r\n', False, False),
     (b'23.4\xB0C \r\n', False, False), (ACK + EOT + NAK, False, False),
     (bytes.fromhex('01 03 00 00 00 0A C5 CD'), False, True),
     (bytes.fromhex('01 83 02 C0 F1'), False, True),

@@ -659,9 +659,9 @@ def test_station_whose_replies_never_arrive_whole_is_not_said_to_take_no_command
             stations.lost(1, NOW)
             stations.heard(1, NOW)
     assert bench.says('station 1') == (
-        WARN, 'WARN: station 1 replies, but each reply has a wrong check: something on the way '
-        'changes bytes. Next: look for flow control, a telnet port and long messages, then for '
-        'noise')
+        WARN, 'WARN: station 1 replies, but each reply has a wrong check or breaks off: something '
+        'on the way changes or drops bytes. Next: look for flow control, a telnet port and long '
+        'messages, then for noise')
     assert bench.says('link') == (
         WARN, 'WARN: port open, but no reply of 1 of 2 stations arrives whole')
 
