@@ -52,6 +52,9 @@ _ENDS_CAUSE = (
     'each time (then let the device server refuse a second client), or the inactivity time of the '
     'server is too short')
 
+# Bytes of a connection that may be a text of the server.
+_LEAST_TEXT, _LONGEST_TEXT = 5, 200
+
 # How a telnet server begins: IAC, WILL to DONT, and the number of an option (RFC 854).
 _NEGOTIATION = re.compile(b'\xFF[\xFB-\xFE][\0-\x31]')
 _TELNET = ('the port of the device server is a telnet port (its first bytes are %s), which '
@@ -86,16 +89,29 @@ class ServerPort(DescriptorPort):
 
 
 class RawPort(ServerPort):
-    """A port of raw TCP; it is lost if the server begins with a negotiation of telnet."""
+    """
+    A port of raw TCP; it is lost if the server begins with a negotiation of telnet.
 
-    _is_begun = False
+    If all that came on a connection is a short text, such as "Port already in use", the error at
+    its end has this text.
+    """
+
+    _said = b''
 
     def _take(self) -> bytes:
         data = super()._take()
-        if not self._is_begun and (found := _NEGOTIATION.match(data)):
+        if not self._said and (found := _NEGOTIATION.match(data)):
             raise OSError(_TELNET % found[0].hex(' ').upper())
-        self._is_begun = self._is_begun or bool(data)
+        self._said += data[:_LONGEST_TEXT + 1 - len(self._said)]
         return data
+
+    def _ended(self, error: OSError) -> OSError:
+        error = super()._ended(error)
+        text = self._said.decode('latin-1').strip()
+        is_text = text.isascii() and text.isprintable()
+        if not is_text or len(text) < _LEAST_TEXT or len(self._said) > _LONGEST_TEXT:
+            return error
+        return OSError(f'{error.strerror or error}; it said "{text}"')
 
 
 def open_port(settings: PortSettings) -> DescriptorPort:

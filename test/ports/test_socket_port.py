@@ -172,6 +172,21 @@ def test_client_that_is_thrown_out_again_and_again_is_told_of_the_other_one(
         'inactivity time of the server is too short']
 
 
+@for_all(('said', 'text'), [
+    (b'Port already in use by 10.0.0.7\r\n', '; it said "Port already in use by 10.0.0.7"'),
+    (b'', ''), (b'\r\n', ''), (b'\x10\x06', ''), (b'x' * 300, ''), (b'caf\xe9', '')])
+def test_text_of_a_server_before_its_end_is_told(said: bytes, text: str) -> None:
+    with socket.create_server(('127.0.0.1', 0)) as listening:
+        port = open_port(PortSettings(f'socket://127.0.0.1:{listening.getsockname()[1]}'))
+        with listening.accept()[0] as server:
+            server.sendall(said)
+        with pytest.raises(OSError) as caught:
+            while port.read(PATIENCE, port.fileno()):  # type: ignore[attr-defined]
+                pass
+        port.close()
+    assert str(caught.value) == f'the other end has closed the connection{text}'
+
+
 def test_server_that_answers_nothing_is_given_up_after_a_second() -> None:
     with socket.socket() as full:
         full.bind(('127.0.0.1', 0))
