@@ -268,7 +268,9 @@ def _try_out(script: TimedCommands, options: argparse.Namespace) -> None:
             if line.strip() != 'quit':
                 execute(line, plcs)
         except CommandError as error:
-            raise CommandError(f'--at: {error}') from None
+            fault, is_long, _ = str(error).partition('\n')
+            more = '; "simulator --help" lists the commands' if is_long else ''
+            raise CommandError(f'--at: {fault}{more}') from None
 
 
 def _load(options: argparse.Namespace,

@@ -201,10 +201,15 @@ def has_reader_left(error: OSError, tell: Callable[[str], None]) -> bool:
     return False
 
 
+_SETTINGS_AFTER = re.compile(r'/dev/[^:,@]+[:,@](\d{3,6})(?:[,:]\w+)*')  # as some programs have it
+
+
 def reason_of(name: str, error: OSError) -> str:
     """Return why ``name`` cannot be used, with advice; the text has the name once."""
     text = error.strerror or str(error)
-    advice = ADVICE.get(error.errno, '') if name.startswith('/dev/') else \
+    settings = _SETTINGS_AFTER.fullmatch(name)
+    advice = f'a speed is given as --baud {settings[1]}' if settings else \
+        ADVICE.get(error.errno, '') if name.startswith('/dev/') else \
         f'a device path is /dev/{name}' if name.startswith('tty') else ''
     return (text if name in text else f'{name}: {text}') + (
         f'; {advice}' if advice else '') + pasted(name)
@@ -296,29 +301,60 @@ class _Parser(argparse.ArgumentParser):
         found, unknown = super().parse_known_args(args, namespace)
         if unknown:
             option = next((text for text in unknown if text.startswith('-')), '')
-            written = option.partition('=')[0]
-            word = written.strip('-').lower()
-            meant = [f'{action.metavar} without {written}' for action in self._actions
-                     if not action.option_strings and action.dest == word] or _alike(word, [
-                         name for name in self._option_string_actions if name.startswith('--')])
-            hint = f'; did you mean {" or ".join(meant)}?' if meant else \
-                '' if option else self._surplus(unknown)
+            hint = self._meant(option) if option else self._surplus(unknown)
             self.error(f'unrecognized arguments: {" ".join(unknown)}{hint}')
         return found, unknown
+
+    def _meant(self, option: str) -> str:
+        """Return which options an unknown option may mean."""
+        written = option.partition('=')[0]
+        word = written.strip('-').lower()
+        meant = [f'{action.metavar} without {written}' for action in self._actions
+                 if not action.option_strings and action.dest == word] or _alike(word, [
+                     name for name in self._option_string_actions if name.startswith('--')])
+        return f'; did you mean {" or ".join(meant)}?' if meant else ''
 
     def _surplus(self, words: Sequence[str]) -> str:
         """Return advice about surplus words that are not options."""
         if words[0].startswith('/dev/') or is_port(words[0]):
             return f'; did you mean --port {words[0]}?'
+        after = self._after_option(words[0])
         places = [action for action in self._actions if not action.option_strings]
-        if any(action.nargs in ('+', '*') for action in places):
-            return '; these stand together, before or after all options'
+        for place in places:
+            if place.nargs in ('+', '*'):
+                return (f'{after}; each {place.metavar} stands beside the others, before or '
+                        'after all options')
+        if after:
+            return after
         wanted = ' and '.join(str(action.metavar) for action in places)
         listed = '; a list has commas, as in 1,2,3' if wanted == 'STATIONS' else ''
         return f'; it takes one {wanted}{listed}' if wanted else '; it takes only options'
 
+    def _unknown(self) -> str:
+        """Return a remark on the first option that is not known; Python tells what is missing."""
+        for word in self._words:
+            if word == '--':
+                break
+            name = word.partition('=')[0]
+            if word.startswith('--') and name not in self._option_string_actions:
+                return f'; {name} is not an option{self._meant(word)}'
+        return ''
+
+    def _after_option(self, word: str) -> str:
+        """Return a remark if a word follows an option that is complete, or empty text."""
+        at = self._words.index(word)
+        for option, nargs, takes in ((self._words[at - 1:at], 0, 'no value'),
+                                     (self._words[at - 2:at - 1], None, 'one value')):
+            name = ''.join(option)
+            action = self._option_string_actions.get(name)
+            if action is not None and action.nargs == nargs:
+                return f'; {name} takes {takes}'
+        return ''
+
     def error(self, message: str) -> NoReturn:
         """End with status 2."""
+        if message.startswith('the following arguments are required'):
+            message += self._unknown()
         self.exit(2, f'{self.prog}: error: {printable(_with_hint(message, self._words))}\n'
                      f'"{self.prog} --help" lists the arguments\n')
 

@@ -41,6 +41,8 @@ _STATUS_BIT = re.compile(r'S2?/(?P<bit>\d{1,5})', re.ASCII)
 def corrections(text: str) -> Iterator[tuple[str, str]]:
     """Yield a possible fault of a text, and a text that may be right."""
     text = text.strip().upper()
+    if (bare := text.rstrip(',;.')) != text:
+        yield f'"{text[len(bare):]}" after it is too much', bare
     if _LETTERS_O.search(text):
         yield ('that is the letter O where a digit should be',
                _LETTERS_O.sub(lambda match: '0' * len(match[0]), text))

@@ -200,7 +200,7 @@ def _refused(capsys: Output, *options: str, status: int = 2) -> str:
     *(((f'--tcp={where}',), 2, f'--tcp "{where}" should be HOST:PORT') for where in (
         '127.0.0.1', 'x', ':', '127.0.0.1:99999', ':-1', 'a:b', 'é..b:80')),
     (('--at', '5 hush 1'), 2, '--at: "hush 1" is not a command'),
-    (('--at', '5 silent 3'), 2, '--at: name a station (1, 2)'),
+    (('--at', '5 silent 3'), 2, '--at: name a station (1, 2); "simulator --help"'),
     (('--at', '5 msg 1 N7:0 5'), 2, '--at: "msg 1 N7:0 5" is not a command'),
     (('--at', '5 slow 1 x'), 2, '--at: slow 1 x: "x" should be'),
     (('--data', str(config_file('simulator.csv')), '--ladder', '2', '--at', '1 reset 2',

@@ -249,6 +249,44 @@ def test_port_that_cannot_be_opened_leads_to_the_cure(number: int, text: str) ->
     assert text not in terminal.reason_of('net.csv', error)
 
 
+@pytest.mark.parametrize(('name', 'advice'), [
+    ('/dev/ttyUSB0:19200', '--baud 19200'), ('/dev/ttyS1,9600,n,8,1', '--baud 9600'),
+    ('/dev/pts/12', 'plc ports')])
+def test_speed_after_the_name_of_a_port_leads_to_its_option(name: str, advice: str) -> None:
+    assert terminal.reason_of(name, FileNotFoundError(errno.ENOENT, 'No file')).count(advice) == 1
+
+
+@pytest.mark.parametrize(('given', 'fault'), [
+    (['a', '--station', '1', '2', 'b'], '2 b; --station takes one value'),
+    (['a', '--set', '12:00'], '12:00; --set takes no value'),
+    (['a', '--set', '--station', '1', 'x'], 'x; --station takes one value'),
+    (['a', 'b'], 'b; it takes one FILE')])
+def test_word_after_the_value_of_an_option_is_told_as_such(
+        given: list[str], fault: str, capsys: pytest.CaptureFixture[str]) -> None:
+    parser = terminal.command_parser('tool', None)
+    parser.add_argument('file', metavar='FILE')
+    parser.add_argument('--station')
+    parser.add_argument('--set', action='store_true')
+    with pytest.raises(SystemExit):
+        parser.parse_args(given)
+    assert f'unrecognized arguments: {fault}\n' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(('given', 'fault'), [
+    (['a', '--htm', 'b'], '--html; --htm is not an option; did you mean --html?'),
+    (['a', '--5'], '--html; --5 is not an option'),
+    (['a', '--htm=b'], '--html; --htm is not an option; did you mean --html?'),
+    (['a'], '--html'), ([], 'FILE, --html'), (['a', '--', '--5'], '--html')])
+def test_unknown_option_is_named_beside_what_is_missing(
+        given: list[str], fault: str, capsys: pytest.CaptureFixture[str]) -> None:
+    parser = terminal.command_parser('tool', None)
+    parser.add_argument('file', metavar='FILE', nargs='+')
+    parser.add_argument('--html', required=True)
+    with pytest.raises(SystemExit):
+        parser.parse_args(given)
+    assert f'arguments are required: {fault}\n' in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(('given', 'meant'), [
     (['--sation', '1'], '--sation 1; did you mean --station?'),
     (['-s', '1'], '-s 1; did you mean --station?'),
@@ -310,8 +348,8 @@ def test_character_that_was_pasted_is_named_in_faults_and_names_of_files(
                                        'in 1,2,3'),
     ('?', 'STATION', ['1', '2'], '2; it takes one STATION'),
     ('?', 'STATION', ['--station', '1'], '--station; did you mean STATION without --station?'),
-    *((many, 'ADDRESS', ['a', '--net', 'n', 'b'], 'b; these stand together, before or after all '
-       'options') for many in '+*')])
+    *((many, 'ADDRESS', ['a', '--net', 'n', 'b'], 'b; --net takes one value; each ADDRESS stands '
+       'beside the others, before or after all options') for many in '+*')])
 def test_words_that_are_too_many_are_told_where_they_belong(
         nargs: str, name: str, given: list[str], hint: str,
         capsys: pytest.CaptureFixture[str]) -> None:

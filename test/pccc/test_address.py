@@ -270,6 +270,8 @@ def test_number_after_a_timer_is_no_bit_unless_it_has_a_name(
     *((f'{file}:0.5', SLC, f'a bit stands after "/"; write {file}:0/5') for file in (
         'B3', 'S2', 'A9', 'D9')),
     ('n7:12.03', PLC5, 'a bit stands after "/"; write N7:12/3'),
+    ('N7:0,', SLC, '"," after it is too much; write N7:0'),
+    ('B3:1/5;', PLC5, '";" after it is too much; write B3:1/5'),
     ('N7:O', SLC, 'that is the letter O where a digit should be; write N7:0'),
     ('N1O:1O-2O', PLC5, 'that is the letter O where a digit should be; write N10:10-20'),
     ('B3:0/O', PLC5, 'that is the letter O where a digit should be; write B3:0/0'),
