@@ -132,6 +132,7 @@ def read_table(path: str, known: Sequence[str], needed: Collection[str] = (),
         if fault := export_fault(path, names):
             raise Problem(path, fault)
         _check_direction(Place(path, first), names, others, known)
+        _check_place(Place(path, first), names, others, known)
     except Problem as problem:
         raise ConfigurationError([problem]) from None
     columns, faults = _columns(Place(path, first), names, known, needed, renamed)
@@ -240,6 +241,20 @@ def _check_direction(place: Place, names: list[str], others: list[tuple[int, str
             and len(below) > 1 and all(below):
         raise Problem(place, 'the names of the columns stand below each other here; they belong '
                              'side by side into one row, and the values into the row below it')
+
+
+def _check_place(place: Place, names: list[str], others: list[tuple[int, str]],
+                 known: Sequence[str]) -> None:
+    """Raise Problem if the names of the columns stand in a later row, as after a sort."""
+    spellings = {name.lower() for name in known}
+
+    def count(cells: Sequence[str]) -> int:
+        return sum(cell.strip().lower() in spellings for cell in cells)
+    if not count(names):
+        for line, text in others:
+            if count(re.split('[,;\t]', text)) > 1:
+                raise Problem(place, f'the names of the columns stand in line {line}, and belong '
+                                     'into the first row; has a spreadsheet sorted the rows?')
 
 
 def _moved(place: Place, cells: Sequence[str], names: Sequence[str],

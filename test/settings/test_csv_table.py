@@ -165,8 +165,11 @@ LONG = 'x' * 100
         '<!DOCTYPE html>\n<html>\n', 'Tag Address Length\na N7:0 2\n')),
     *((content, [NO_COLUMN + RSLOGIX + BETWEEN]) for content in (
         'N7:0,"SPEED","Line speed"\n', 'a,n7:0/3,2\n', 'I:1.0/3,Global\n')),
-    ('// made by hand\nTag,Address\na,N7:0\n', [
-        f'{NO_COLUMN}, and a comment begins with #{BETWEEN}']),
+    *((content, [f'FILE:1: the names of the columns stand in line {line}, and belong into the '
+                 'first row; has a spreadsheet sorted the rows?']) for content, line in (
+        ('a,N7:0,2\n# c\nb,N7:1,3\ntag,Address,LENGTH\nz,N7:3,4\n', 4),
+        ('a;N7:0\nTag;Address\n', 2), ('// made by hand\nTag,Address\na,N7:0\n', 2))),
+    ('// made by hand\nTag\na\n', [f'{NO_COLUMN}, and a comment begins with #{BETWEEN}']),
     *((content, [EMPTY]) for content in (
         '', '\n\n', '\ufeff', '# only\n# comments\n', ',,,\n;\n\t\n', '  \r\n')),
     # Rows.

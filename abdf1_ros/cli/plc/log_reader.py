@@ -24,6 +24,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 import csv
 from datetime import datetime
 import json
+import math
 from pathlib import Path
 from typing import NamedTuple, TextIO
 
@@ -77,16 +78,21 @@ def samples(path: str, remark: Callable[[str], None]) -> Iterator[Sample]:
         if first.startswith('{'):
             yield from _json(path, [first], 1)
             yield from _json(path, lines, 2)
-        elif first == ','.join(COLUMNS):
-            yield from _rows(path, lines, _logged)
-        elif first == ','.join(_RECORDED):
-            yield from _rows(path, lines, _recorded)
+        elif delimiter := _delimiter(first, COLUMNS):
+            yield from _rows(path, lines, _logged, delimiter)
+        elif delimiter := _delimiter(first, _RECORDED):
+            yield from _rows(path, lines, _recorded, delimiter)
         else:
             if is_capture_line(first):
                 raise Problem(f'{path}:1', 'bytes, not values: "sniff --html" draws them')
             raise Problem(f'{path}:1', (
                 'is not a CSV or JSON lines of "plc log", nor a CSV of recorder.py: it begins '
                 f'with "{shown(first)}"' if first else 'the file is empty'))
+
+
+def _delimiter(head: str, columns: Sequence[str]) -> str:
+    """Return what divides a head of these columns, empty for another; a spreadsheet may choose."""
+    return next((sign for sign in ',;\t' if head == sign.join(columns)), '')
 
 
 def _whole_lines(file: TextIO, tell_cut: Callable[[], None]) -> Iterator[str]:
@@ -98,8 +104,8 @@ def _whole_lines(file: TextIO, tell_cut: Callable[[], None]) -> Iterator[str]:
 
 
 def _rows(path: str, lines: Iterable[str],
-          read: Callable[[Sequence[str]], Iterable[Sample]]) -> Iterator[Sample]:
-    reader = csv.reader(lines)
+          read: Callable[[Sequence[str]], Iterable[Sample]], delimiter: str) -> Iterator[Sample]:
+    reader = csv.reader(lines, delimiter=delimiter)
     while True:
         try:
             row = next(reader, None)
@@ -126,15 +132,21 @@ def _sample(when: datetime, station: str, address: str, tag: str, value: float |
             reason: str) -> Sample:
     if not address:
         return Sample(when, None, None, reason)
+    return _at(when, ValuePlace(station, address, tag), value, reason)
+
+
+def _at(when: datetime, place: ValuePlace, value: float | str | None, reason: str) -> Sample:
+    if isinstance(value, float) and not math.isfinite(value):  # as in the other forms of a log
+        value, reason = None, f'the value is {value}'
     # An empty text is a value, if no reason says that there is none.
     missing = value is None or value == '' and reason and not is_end_of_gap(reason)
-    return Sample(when, ValuePlace(station, address, tag), None if missing else value, reason)
+    return Sample(when, place, None if missing else value, reason)
 
 
 def _value(text: str, address: str) -> float | str:
     if text.lower() in _NOT_FINITE:
         return float(text)
-    number = None if address.startswith(_STRING_FILE) else decimal_number(text)
+    number = None if address.startswith(_STRING_FILE) else decimal_number(text.replace(',', '.'))
     return text if number is None else number
 
 
@@ -145,8 +157,8 @@ def _recorded(row: Sequence[str]) -> Iterator[Sample]:
     when = _moment(time)
     for number, text in enumerate(values):
         name = topic if len(values) == 1 else f'{topic}[{number}]'
-        yield Sample(when, ValuePlace('', address if not number else '', name),
-                     _value(text, address or _STRING_FILE), '')
+        yield _at(when, ValuePlace('', address if not number else '', name),
+                  _value(text, address or _STRING_FILE), '')
 
 
 def _json(path: str, lines: Iterable[str], first: int) -> Iterator[Sample]:
@@ -166,7 +178,11 @@ def _of_json(row: Mapping[str, object]) -> Sample:
 
 
 def _moment(text: str) -> datetime:
-    when = datetime.fromisoformat(text)
+    try:
+        when = datetime.fromisoformat(text)
+    except ValueError:
+        raise ValueError(f'"{shown(text)}" is not a time as "plc log" writes it; if a spreadsheet '
+                         'has saved the file again, draw the original') from None
     if when.tzinfo is None:
         raise ValueError(f'{text} has no UTC offset')
     return when

@@ -468,6 +468,35 @@ def test_columns_of_short_rows_are_compared_as_they_stand(tmp_path: Path) -> Non
     assert 'several PLCs: A, B;' in refusal(tmp_path, text)
 
 
+def test_row_whose_plc_a_merged_cell_names_is_left_out_with_the_cure(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = 'PLC,Tag,Address\nA,x,N7:0\n,y,N7:1\nB,z,N7:2\n'
+    cure = 'names no PLC: fill the cells below a name that a spreadsheet has merged'
+    assert refusal(tmp_path, text).endswith(f'; a row {cure}')
+    source = tmp_path / 'merged.csv'
+    source.write_text(text, encoding='utf-8')
+    assert main(['import', str(source), '--plc', 'A', '--into', str(tmp_path)]) == 1
+    said = capsys.readouterr()
+    assert f'merged.csv:3: y: {cure}\n' in said.err
+    assert 'ignored: 1 rows of other PLCs\n' in said.out
+
+
+def test_print_of_a_data_file_is_no_list(tmp_path: Path) -> None:
+    head = 'Offset,0,1,2,3\n'
+    assert 'has values beside addresses' in refusal(
+        tmp_path, f'{head}N7:0,1200,800,0,-1\nN7:4,1,2,3,4\n')
+    assert 'has values beside addresses' in refusal(tmp_path, 'F8:0,1.5,2\nF8:2,0,-7e3\n')
+
+
+def test_family_is_not_advised_for_a_file_that_is_not_understood(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source = tmp_path / 'labels.csv'
+    source.write_text('Name,Address type,Address\nSpeed,N7,0\nTemp,F8,4\n', encoding='utf-8')
+    assert main(['import', str(source), '--into', str(tmp_path)]) == 1
+    said = capsys.readouterr().err
+    assert 'Address type' in said and '--plc-type' not in said
+
+
 def test_family_that_could_have_the_addresses_is_named(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     source = tmp_path / 'list.csv'

@@ -341,6 +341,14 @@ def test_log_refuses_what_it_cannot_do_before_it_asks_a_plc(tmp_path: Path, caps
         assert said.status == 2 and text in said.err and said.err.count('\n') == 1
     assert call(main, capsys, 'log', 'N7:0', 'shift.csv', *port) == Said(
         2, '', 'plc: shift.csv: give the file as --to shift.csv\n')
+    for name, form, text in (
+            ('shift.XLSX', 'csv', 'is a name of a workbook, and "plc log" writes text: name it '
+             'shift.csv'),
+            ('shift.json', 'csv', 'is a name of another form: give --format jsonl'),
+            ('shift.csv', 'influx', 'is a name of another form: give --format csv')):
+        asked = '--to', name, '--format', form
+        assert call(main, capsys, 'log', 'N7:0', *asked, *port) == Said(
+            2, '', f'plc: --to: {name}: {text}\n')
     to = tmp_path / 'new.csv'
     said = call(main, capsys, 'log', 'N7:0', '--to', str(to), *port)
     assert said.status == 1 and not to.exists()

@@ -223,6 +223,30 @@ def test_clock_that_is_set_back_and_values_that_are_no_numbers_are_drawn(
     assert '2026-03-01 14:04:10 to 2026-03-01 14:06:40' in ' '.join(elements(page).texts)
 
 
+@pytest.mark.parametrize('form', ['csv', 'jsonl'])
+def test_value_that_is_no_number_is_a_gap(tmp_path: Path, capsys: Output, form: str) -> None:
+    rows = [row(0, 'F8:0', 1.5), row(10, 'F8:0', math.nan), row(20, 'F8:0', 2.5)]
+    _, page = plotted(tmp_path, capsys, logged(tmp_path / 'shift', rows, form))
+    found = elements(page)
+    assert 'the value is nan' in found.texts and '1 gap, the longest 20.0 s' in found.texts
+
+
+def test_log_that_a_spreadsheet_has_saved_is_drawn_while_its_times_are_kept(
+        tmp_path: Path, capsys: Output) -> None:
+    file = tmp_path / 'shift.csv'
+    time = BEGIN.isoformat(timespec='milliseconds')
+    file.write_bytes(b'\xef\xbb\xbf' + f'{HEAD.replace(",", ";")}\r\n{time};1;F8:0;;2,5;\r\n'
+                     f'{time};1;ST9:0;;a,5;\r\n'.encode())
+    said, page = plotted(tmp_path, capsys, file)
+    assert said.status == 0
+    assert {'2.5', 'a,5'} <= {*elements(page).texts}
+    file.write_text(f'{HEAD.replace(",", ";")}\n01.03.2026 14:05;1;F8:0;;2,5;\n')
+    said, _ = plotted(tmp_path, capsys, file)
+    assert said.status == 2 and said.err == (
+        f'plc: {file}:2: this row cannot be read: "01.03.2026 14:05" is not a time as "plc log" '
+        'writes it; if a spreadsheet has saved the file again, draw the original\n')
+
+
 def test_gaps_without_number_are_joined_and_still_counted() -> None:
     picture, place = ValuePicture(), ValuePlace('1', 'N7:0', '')
     for number in range(6000):

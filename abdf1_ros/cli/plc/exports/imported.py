@@ -89,8 +89,10 @@ def import_map(path: str, wanted: Wanted) -> Import:
     for record, row in rows:
         if isinstance(row, Ignored):
             result.ignored[row.what] += bool(row.what)
-        elif (there := stations(row)) is None:
+        elif (there := stations(row)) is None and _name(row):
             result.ignored['rows of other PLCs'] += 1
+        elif there is None:
+            _leave_out(result, path, record, row.cells, _UNNAMED)
         elif row.fault:
             _leave_out(result, path, record, row.cells, row.fault)
         else:
@@ -109,6 +111,8 @@ def _refuse_values(path: str) -> None:
             raise ConfigurationError([Problem(
                 f'{path}:1', 'values, not a list of tags: "plc plot" draws them')])
 
+
+_UNNAMED = 'names no PLC: fill the cells below a name that a spreadsheet has merged'
 
 _Heads = dict[str, str]
 """The text before the tags of a row, by its station."""
@@ -140,7 +144,8 @@ def _stations(path: str, rows: Sequence[FoundRow], is_open: bool,
         raise ConfigurationError([Problem(path, (
             f'has rows of several PLCs: {listed}; choose one with --plc NAME, or give the station '
             'of each with --station-of NAME=N,NAME=N'
-            + '; if a column of a list names no PLCs: --ignore COLUMN' * is_open))])
+            + '; if a column of a list names no PLCs: --ignore COLUMN' * is_open
+            + f'; a row {_UNNAMED}' * ('' in names)))])
     heads = _heads_of(good, wanted)
 
     def of(row: FoundRow) -> _Heads | None:

@@ -28,6 +28,7 @@ import io
 from pathlib import Path
 import re
 
+from abdf1_ros.numbers import decimal_number
 from abdf1_ros.problems import ConfigurationError, Place, Problem
 from abdf1_ros.settings.hints import looks_like_address, WORKBOOKS
 
@@ -196,4 +197,13 @@ def without_names(sheet: Sheet) -> str:
     if not any(map(looks_like_address, with_address)):
         return ('has addresses, but blanks or other signs between its cells; put commas between '
                 'them, or copy the table into a spreadsheet and save it as "CSV UTF-8"')
+    if len(with_address) > 1 and all(map(_is_of_values, sheet.records[-len(with_address):])):
+        return ('has values beside addresses, as a print of a data file, and no names; "plc files '
+                '--map" makes rows for the files of a PLC')
     return 'has addresses, but no first row with names: write one, such as Address,Tag'
+
+
+def _is_of_values(record: Record) -> bool:
+    """Return True if a record has an address, and then at least two values."""
+    return len(record.cells) > 2 and looks_like_address(record.first) and all(
+        decimal_number(cell) is not None for cell in record.cells[1:] if cell)

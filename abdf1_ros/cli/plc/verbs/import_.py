@@ -98,11 +98,12 @@ def _stations_by_name(text: str) -> dict[str, int]:
 
 
 def _other_family(path: str, wanted: Wanted) -> str:
-    """Return the family that can use rows of a file, empty for none."""
+    """Return the family that can use all rows of a file, empty for none or an unclear file."""
     for kind in FAMILIES:
         with suppress(ConfigurationError):
-            if count := import_map(path, replace(wanted, plc_type=kind)).count:
-                return f'; --plc-type {kind.value} can use {counted(count, "row")}'
+            found = import_map(path, replace(wanted, plc_type=kind))
+            if found.count and not found.left_out and not found.notes:
+                return f'; --plc-type {kind.value} can use {counted(found.count, "row")}'
     return ''
 
 

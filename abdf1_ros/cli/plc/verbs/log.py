@@ -23,6 +23,7 @@ Log values to a file that is continued: each read, and the reason of each gap.
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 import re
 
 from abdf1_ros.cli.plc.log import log_values
@@ -36,6 +37,11 @@ from abdf1_ros.problems import ConfigurationError, Problem
 _FILE = re.compile(r'[^:]+\.(csv|jsonl?|txt|log|influx)', re.IGNORECASE)
 
 
+_WORKBOOKS = '.xls', '.xlsx', '.xlsm', '.ods'
+_ENDINGS = {'.csv': 'csv', '.jsonl': 'jsonl', '.ndjson': 'jsonl', '.json': 'jsonl',
+            '.influx': 'influx', '.lp': 'influx'}
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments."""
     add_addresses(parser, has_radix=False)
@@ -47,11 +53,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                              'InfluxDB (default: %(default)s)')
 
 
+def _misnamed(path: str, form: str) -> str:
+    """Return what the name of a file has against a form, empty for nothing."""
+    ending = Path(path).suffix.lower()
+    if ending in _WORKBOOKS:
+        return f'is a name of a workbook, and "plc log" writes text: name it {Path(path).stem}.csv'
+    meant = _ENDINGS.get(ending, form)
+    return f'is a name of another form: give --format {meant}' if meant != form else ''
+
+
 def run(options: argparse.Namespace) -> int:
     """Log the values of addresses or rows; in Mode Listen those that another master reads."""
     if file := next((word for word in options.addresses if _FILE.fullmatch(word)), None):
         raise ConfigurationError([Problem(file, f'give the file as --to {file}')])
     targets, form = to_read(options), FORMS[options.format]
+    if options.to and (fault := _misnamed(options.to, options.format)):
+        raise ConfigurationError([Problem('--to', f'{options.to}: {fault}')])
     if options.to is None:
         return log_values(options, targets, LogOutput(form), may_listen=True)
     file = LogFile(options.to, form)
