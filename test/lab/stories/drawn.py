@@ -48,7 +48,7 @@ from stories.walk import Ledger, text_of, Told, Walk
 
 _ROOT = Path(__file__).resolve().parents[3]
 # The code that decides what is written.
-DECIDING = ('flights.py', 'write.py', 'kernel*.py', 'interlocks/*.py', 'writes/*.py')
+DECIDING = ('write.py', 'kernel/*.py', 'writes/*.py')
 _CHEAP = ('little gets', 'little free', 'little end')  # whose pairs take half a minute
 _LONGEST = 180  # s of a processor, for all stories of a mistake, which may let one hang
 

@@ -461,7 +461,7 @@ class Telling:
             'a mode that is not seen': world.line.now <= self._mode_seen_at + 2 * STEP,
             'a clock': world.clocks.lead,
             'the port': not driver.is_online,
-            'an end': driver.interlocks.end.is_asked,
+            'an end': driver.kernel.end.is_asked,
             'the gateway': any(not kept.is_done for kept in self._kept),
             'commands': driver.guests.waiting or any(
                 is_write(job.command) for job in driver.tasks.under_way),

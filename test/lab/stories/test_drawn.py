@@ -30,7 +30,7 @@ def lands(self, now):
 
 
 def _root(folder: Path) -> Path:
-    path = folder / 'abdf1_ros/driver/flights.py'
+    path = folder / 'abdf1_ros/driver/kernel/flights.py'
     path.parent.mkdir(parents=True)
     path.write_text(_CODE)
     return folder
@@ -45,7 +45,7 @@ def _all(root: Path) -> list[Edit]:
 
 def test_each_kind_of_mistake_is_drawn(tmp_path: Path) -> None:
     edits = _all(_root(tmp_path))
-    lines = {line for edit in edits for line in edit.texts['abdf1_ros/driver/flights.py'].split(
+    lines = {line for edit in edits for line in edit.texts['abdf1_ros/driver/kernel/flights.py'].split(
         '\n')} - {*_CODE.split('\n')}
     assert lines == {
         '    until = (max([self.until]))', '    until = (max([self.opened]))', '    pass',
@@ -66,7 +66,7 @@ def test_seed_draws_the_same_mistakes_again(tmp_path: Path) -> None:
 
 
 def test_mistakes_of_a_file_have_to_fit(tmp_path: Path) -> None:
-    root, file = _root(tmp_path), 'abdf1_ros/driver/flights.py'
+    root, file = _root(tmp_path), 'abdf1_ros/driver/kernel/flights.py'
     lot = tmp_path / 'lot.json'
     mistake = {'name': 'a1', 'what': 'forgets nothing', 'changes': [
         [file, '    self.forget(now)\n', ''], [file, 'self.looked', 'self.seen']]}
