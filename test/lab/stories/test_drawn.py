@@ -20,6 +20,7 @@ from pathlib import Path
 import pytest
 from stories.drawn import draw, Edit, read_lot
 
+_FILE = 'abdf1_ros/driver/kernel/flights.py'
 _CODE = """\
 def lands(self, now):
     until = max(self.until, self.opened)
@@ -30,7 +31,7 @@ def lands(self, now):
 
 
 def _root(folder: Path) -> Path:
-    path = folder / 'abdf1_ros/driver/kernel/flights.py'
+    path = folder / _FILE
     path.parent.mkdir(parents=True)
     path.write_text(_CODE)
     return folder
@@ -45,8 +46,8 @@ def _all(root: Path) -> list[Edit]:
 
 def test_each_kind_of_mistake_is_drawn(tmp_path: Path) -> None:
     edits = _all(_root(tmp_path))
-    lines = {line for edit in edits for line in edit.texts['abdf1_ros/driver/kernel/flights.py'].split(
-        '\n')} - {*_CODE.split('\n')}
+    lines = {line for edit in edits for line in edit.texts[_FILE].split('\n')}
+    lines -= {*_CODE.split('\n')}
     assert lines == {
         '    until = (max([self.until]))', '    until = (max([self.opened]))', '    pass',
         '    return (now >= until) and self.begun or until is None',
@@ -66,7 +67,7 @@ def test_seed_draws_the_same_mistakes_again(tmp_path: Path) -> None:
 
 
 def test_mistakes_of_a_file_have_to_fit(tmp_path: Path) -> None:
-    root, file = _root(tmp_path), 'abdf1_ros/driver/kernel/flights.py'
+    root, file = _root(tmp_path), _FILE
     lot = tmp_path / 'lot.json'
     mistake = {'name': 'a1', 'what': 'forgets nothing', 'changes': [
         [file, '    self.forget(now)\n', ''], [file, 'self.looked', 'self.seen']]}
