@@ -244,7 +244,8 @@ class LogFile(Log):
     A log on the disk that is continued, row by row.
 
     ``count`` is the number of rows of this run. The file never has half a row: the rest of one,
-    after a power failure, is removed, and ``remark`` says so. Raises ConfigurationError if the
+    after a power failure, is removed, and ``remark`` says so. If another program empties the file,
+    it begins again with its head. Raises ConfigurationError if the
     file is not a log of this form, if another program writes to it, or if it cannot be opened.
     """
 
@@ -304,7 +305,7 @@ class LogFile(Log):
         return ConfigurationError([Problem('--to', f'{self.path} {text}; give another name')])
 
     def _put(self, text: str) -> None:
-        left = data = f'{text}\n'.encode()
+        left = data = f'{self._head_anew()}{text}\n'.encode()
         try:
             while left:
                 left = left[os.write(self._file, left):]
@@ -313,6 +314,18 @@ class LogFile(Log):
                 os.ftruncate(self._file, self._size)  # half a row would mean another value
             raise LogLost(_lost(self.path, error, self.count)) from None
         self._size += len(data)
+
+    def _head_anew(self) -> str:
+        """Return the head if another program has emptied the file; LogLost if it is removed."""
+        status = os.fstat(self._file)
+        if not self._is_regular:
+            return ''
+        if not status.st_nlink:
+            raise LogLost(f'{self.path} was removed; the log ends here, after {self.count} rows '
+                          'of this run')
+        was_emptied = self._size and not status.st_size
+        self._size = status.st_size
+        return f'{self._form.head}\n' if was_emptied and self._form.head else ''
 
     def close(self) -> None:
         """Close the file; remove it if it is new and nothing was written to it."""

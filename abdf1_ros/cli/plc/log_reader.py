@@ -35,6 +35,7 @@ from abdf1_ros.sniffer.capture import is_capture_line
 from abdf1_ros.text import shown
 
 _RECORDED = ('time', 'topic', 'address', 'values')
+_OF_SPREADSHEETS = str.maketrans(';\t', ',,', '"')
 _STRING_FILE = 'ST'
 _NOT_FINITE = {'nan', 'inf', '-inf'}
 
@@ -85,6 +86,10 @@ def samples(path: str, remark: Callable[[str], None]) -> Iterator[Sample]:
         else:
             if is_capture_line(first):
                 raise Problem(f'{path}:1', 'bytes, not values: "sniff --html" draws them')
+            if first.translate(_OF_SPREADSHEETS) == ','.join(COLUMNS):
+                raise Problem(f'{path}:1', (
+                    'a spreadsheet has saved this file, and may have changed its times and '
+                    'numbers; give the file as "plc log" wrote it'))
             raise Problem(f'{path}:1', (
                 'is not a CSV or JSON lines of "plc log", nor a CSV of recorder.py: it begins '
                 f'with "{shown(first)}"' if first else 'the file is empty'))

@@ -22,6 +22,7 @@ from datetime import datetime, timedelta, timezone
 import io
 from itertools import count
 import json
+import os
 from pathlib import Path
 import select
 import signal
@@ -180,6 +181,21 @@ def test_full_disk_leaves_whole_rows(tmp_path: Path) -> None:
                                 'this run'
 
 
+def test_file_that_is_emptied_begins_again_with_its_head(tmp_path: Path) -> None:
+    path = tmp_path / 'shift'
+    log = log_of(path)
+    log.begin()
+    log.write(ROWS[:1])
+    os.truncate(path, 0)
+    log.write(ROWS[2:3])
+    log.write(ROWS[:1])
+    assert path.read_text().splitlines() == [HEAD, *map(FORMS['csv'].line, (ROWS[2], ROWS[0]))]
+    path.unlink()
+    with pytest.raises(LogLost, match=f'^{path} was removed; the log ends here, after 3 rows'):
+        log.write(ROWS[:1])
+    log.close()
+
+
 SIMULATED = 'Station,PLC_Type,Address,Length,Values', [
     '1,SLC,N7:0,4,5', '1,SLC,ST9:0,1,Tank', '1,SLC,F8:0,2,1.5']
 
@@ -307,6 +323,7 @@ def test_log_goes_to_a_file_and_to_the_output(plc: Plc, tmp_path: Path) -> None:
         assert said.lines[1].partition(',')[2] == '1,N7:0,,1200,'
     assert plc('watch', 'N7:0', '--csv', '--radix', 'hex') == Said(
         2, '', 'plc: --radix: is for a table; --csv has decimal numbers\n')
+    assert plc('log', 'N7:0', '--count', '1', '--to', '-').lines[0] == HEAD
     row = json.loads(plc('log', 'N7:0', '--count', '1', '--format', 'jsonl').lines[0])
     assert (row['address'], row['value'], row['reason']) == ('N7:0', 1200, '')
 

@@ -47,7 +47,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_addresses(parser, has_radix=False)
     add_repetition(parser)
     parser.add_argument('--to', metavar='FILE', type=expanded,
-                        help='the file, new or of an earlier "plc log" (default: standard output)')
+                        help='the file, new or of an earlier "plc log" (default, also "-": '
+                             'standard output)')
     parser.add_argument('--format', choices=tuple(FORMS), default='csv',
                         help='csv; jsonl: one JSON object a line; influx: line protocol of '
                              'InfluxDB (default: %(default)s)')
@@ -69,7 +70,7 @@ def run(options: argparse.Namespace) -> int:
     targets, form = to_read(options), FORMS[options.format]
     if options.to and (fault := _misnamed(options.to, options.format)):
         raise ConfigurationError([Problem('--to', f'{options.to}: {fault}')])
-    if options.to is None:
+    if options.to in (None, '-'):
         return log_values(options, targets, LogOutput(form), may_listen=True)
     file = LogFile(options.to, form)
     if file.remark:
