@@ -171,6 +171,24 @@ def test_commands_wait_here_in_turns_and_go_with_their_session() -> None:
         assert two.hear().cip[-6:] == bytes.fromhex('4F 00 6400 0200')
 
 
+def test_outcome_of_a_write_whose_client_has_left_is_told_to_nobody() -> None:
+    """The client comes again, with the same connection, count and bytes."""
+    write = execute(write_word(7, 1, 5, 9))
+    with served() as it:
+        with it.client(is_connected=True) as gone:
+            gone.send(connected(write, gone.session, gone.connection, 1))
+            first, = it.wait_for_asked(1)
+        with it.client(is_connected=True) as again, it.client() as other:
+            again.send(connected(write, again.session, again.connection, 1))
+            second = it.wait_for_asked(2)[1]
+            assert second.packet == first.packet
+            first.answer(first.packet.reply(sts=0x10))
+            for client in again, other:
+                assert client.ask(message(0x04)).command == 0x04
+            second.answer(second.packet.reply())
+            assert again.hear().cip[-4:] == bytes.fromhex('4F 00 0900')
+
+
 def test_command_waits_no_longer_than_its_client_or_cmd_timeout() -> None:
     with served(cmd_timeout=600) as it, it.client() as client:
         for tns in range(3):

@@ -129,13 +129,13 @@ class EthernetClient:
     def __init__(self, host: str, port: int, *, is_connected: bool = False) -> None:
         self._socket = socket.create_connection((host, port), timeout=30.0)
         self._count = 0
-        self._connection = 0
+        self.connection = 0
         self.session = 0
         self.session = self.ask(REGISTER).session
         if is_connected:
             told = self.ask(unconnected(forward_open(), self.session)).cip
             assert told[:4] == bytes((0xD4, 0, 0, 0))
-            self._connection, = struct.unpack_from('<I', told, 4)
+            self.connection, = struct.unpack_from('<I', told, 4)
 
     def ask(self, data: bytes) -> Heard:
         """Send bytes; return the next message."""
@@ -162,12 +162,12 @@ class EthernetClient:
 
     def execute(self, pccc: bytes) -> bytes:
         """Send a command; return its reply, both from CMD on."""
-        if not self._connection:
+        if not self.connection:
             told = self.ask(unconnected(execute(pccc), self.session)).cip
         else:
             self._count += 1
             told = self.ask(connected(
-                execute(pccc), self.session, self._connection, self._count)).cip
+                execute(pccc), self.session, self.connection, self._count)).cip
             assert told[:2] == self._count.to_bytes(2, 'little')
             told = told[2:]
         assert told[:4 + len(REQUESTOR)] == bytes((0xCB, 0, 0, 0)) + REQUESTOR

@@ -26,7 +26,7 @@ import pty
 import socket
 import sys
 import time
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 from abdf1_ros.df1.checksum import Checksum
@@ -111,6 +111,23 @@ def test_a_long_is_the_same_with_both_of_its_words_alone(run: ModuleType) -> Non
     assert not run.same([0x10001], [1])
     assert run.same([-1, 1], [0xFFFF, 1])
     assert run.same([-16.0], [-16])
+
+
+def test_lost_beats_and_rows_that_are_too_old_are_not_good(
+        run: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+    ours = sys.modules['ours']
+    now = [100.0]
+    monkeypatch.setattr(ours, 'time', SimpleNamespace(monotonic=lambda: now[0]))
+    age = ours.RowAge(promised=1.5)
+    for arrived, read in (100.5, 100.4), (101.8, 101.7):
+        now[0] = arrived
+        age.take(int(read * 1000) % 0x8000)
+    assert age.seen == pytest.approx(1.4, abs=0.002)
+    good = run.Tally(right=1, ours=1, beats=9, age=age)
+    assert good.is_good and not replace(good, lost_beats=1).is_good
+    now[0] = 103.3
+    age.take(int(103.3 * 1000) % 0x8000)
+    assert age.seen == pytest.approx(1.6, abs=0.002) and not good.is_good
 
 
 def test_sessions_of_a_place_share_the_line_of_a_node_at_work(run: ModuleType) -> None:
