@@ -56,10 +56,10 @@ def ask(options: argparse.Namespace, work: Callable[[argparse.Namespace, Session
     - ``record``: a file for all bytes of the line.
     """
     network = _line(options, targets, writes)
-    if writes and is_beside_master(network):
-        return EXIT_FAILED
     routes = targets.routes if targets else None
     with Session(network, via=options.via, record=record, routes=routes) as session:
+        if writes and is_beside_master(session):
+            return EXIT_FAILED
         if options.via is not None and (
                 who := presence.common_identity(session, options.station, options.via)):
             complain(f'stations {options.station} and {options.via} are both "{who}": if '

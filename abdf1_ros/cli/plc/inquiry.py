@@ -21,15 +21,14 @@ from dataclasses import replace
 import time
 from typing import Protocol
 
-from abdf1_ros.cli.plc import presence
+from abdf1_ros.cli.plc import overhear, presence
 from abdf1_ros.cli.plc.line import free_station, MODES
-from abdf1_ros.cli.plc.overhear import overhear
 from abdf1_ros.cli.plc.session import complain, Session, Witness
 from abdf1_ros.cli.terminal import EXIT_FAILED
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.diagnosis.causes import Decider, diagnose, Diagnosis
-from abdf1_ros.diagnosis.traces import Traces
+from abdf1_ros.diagnosis.traces import SURE, Traces
 from abdf1_ros.errors import PortLost
 from abdf1_ros.pccc.steps import echo
 from abdf1_ros.settings.network import Network
@@ -89,12 +88,25 @@ def concluded(reads: Judged, failed: int) -> int:
     return EXIT_FAILED if failed else 0
 
 
-def is_beside_master(network: Network) -> bool:
-    """Listen to a half-duplex line; tell of another master, and return True if there is one."""
-    master = overhear(network, [network.baud]) if network.line_mode.is_master else None
-    if master is not None:
-        complain(f'nothing was sent: {diagnose(Traces(masters=tuple(master.stations)))}')
-    return master is not None
+def is_beside_master(session: Session) -> bool:
+    """
+    Listen on a half-duplex line before the first command; tell of another master.
+
+    Returns True if there is one. The session itself listens, so the port is opened only once: some
+    device servers reset the PLC, or refuse the next client for a while.
+    """
+    network = session.network
+    if not network.line_mode.is_master:
+        return False
+    session.settle()
+    time.sleep(overhear.LISTENED)
+    heard = session.traces(network.station)
+    if 0 < heard.foreign_polls < SURE:  # more may come from a slow master
+        time.sleep(overhear.LISTENED_ON - overhear.LISTENED)
+        heard = session.traces(network.station)
+    if heard.masters:
+        complain(f'nothing was sent: {diagnose(Traces(masters=heard.masters))}')
+    return bool(heard.masters)
 
 
 class Examination:

@@ -158,9 +158,13 @@ def _basic_read() -> Steps[None]:
 def scan(network: Network, stations: Sequence[int], via: int | None = None,
          show: Callable[[str], None] = lambda text: None,
          ended: Callable[[Session], None] = lambda session: None, *,
-         asks_all: bool = True) -> Iterator[Presence]:
+         asks_all: bool = True,
+         is_beside_master: Callable[[Session], bool] = lambda session: False,
+         ) -> Iterator[Presence]:
     """
     Yield the presence of every station, ``via`` a gateway; raises OSError and PortLost.
+
+    Beside another master no station is asked.
 
     In full duplex the scan ends, unless it ``asks_all``, after a number of stations in a row of
     which only an ACK came.
@@ -173,6 +177,8 @@ def scan(network: Network, stations: Sequence[int], via: int | None = None,
     if not network.line_mode.has_one_plc and not network.line_mode.is_polled:
         network = replace(network, station=free_station(network.station, {*stations, via}))
     with Session(network, absent=stations, via=via) as session:
+        if is_beside_master(session):
+            return
         left: Sequence[int] = stations
         counters, has_lost, is_found, in_vain = session.counters, False, False, 0
         for asked in range(1, _MOST_ROUNDS + 1):

@@ -24,8 +24,12 @@ import threading
 import time
 from unittest.mock import Mock
 
+from abdf1_ros import open_line
 from abdf1_ros.cli.plc import inquiry
 from abdf1_ros.cli.plc.command import main
+from abdf1_ros.ports.descriptor import Port
+from abdf1_ros.ports.opening import open_port
+from abdf1_ros.ports.settings import PortSettings
 import pytest
 from support.cases import for_all
 from support.commands import call, Output, Said
@@ -317,6 +321,23 @@ def test_commands_that_do_harm_send_nothing_beside_another_master(
             'nothing was sent: another master polls station 3 of this line, and two masters '
             'destroy their messages. Next: end one of them, or only listen: "plc init" writes '
             'files for Mode Listen']
+
+
+def test_commands_that_listen_first_open_the_port_once(
+        tmp_path: Path, capsys: Output, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A device server with one client, and one that resets at DTR, notice each time."""
+    opened: list[str] = []
+
+    def open_counted(settings: PortSettings) -> Port:
+        opened.append(settings.name)
+        return open_port(settings)
+
+    monkeypatch.setattr(open_line, 'open_port', open_counted)
+    with odd_line(tmp_path / 'line', OddDevice(Wiring.HALF, 1)) as name:
+        for verb in (('scan', '1'), ('write', 'N7:0', '1', '--station', '1', '--yes',
+                                     '--plc-type', 'SLC')):
+            assert call(main, capsys, *verb, '--port', name).status == 0
+    assert opened == [name, name]
 
 
 def test_other_commands_tell_of_another_master_that_they_hear(

@@ -58,12 +58,10 @@ def run(options: argparse.Namespace) -> int:
     found = acknowledged = count = 0
     asked = 1
     network = network_of(options)
-    if is_beside_master(network):
-        return EXIT_FAILED
     ended: list[Session] = []
     for there in presence.scan(
             network, options.stations, options.via, progress.show, ended.append,
-            asks_all=options.asks_all):
+            asks_all=options.asks_all, is_beside_master=is_beside_master):
         count += 1
         if there.is_there:
             if not found:
@@ -80,6 +78,8 @@ def run(options: argparse.Namespace) -> int:
             acknowledged += there.is_only_acknowledged
             asked = max(asked, there.asked)
     progress.clear()
+    if not count:  # beside another master
+        return EXIT_FAILED
     print(presence.tally(found, count, asked, acknowledged))
     if count < len(options.stations):
         print(_LEFT_OUT.format(len(options.stations) - count))
