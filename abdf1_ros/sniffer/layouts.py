@@ -44,7 +44,8 @@ _DATE = r'(?:\d{4}[-/.]\d\d?[-/.]\d\d?|\d\d?[-/.]\d\d?[-/.](?:\d{4}|\d\d(?=[ T])
 TIME_OF_DAY = re.compile(
     rf'(?<![0-9A-Fa-f:.])(?:{_DATE}[ T,]+)?(?P<hours>\d\d?):(?P<minutes>\d\d):'
     r'(?P<seconds>\d\d(?:[.,]\d+|:\d{3,9})?)(?!:?[0-9A-Fa-f])(?:\s?(?P<half>[AaPp])[Mm]\b)?')
-SECONDS = re.compile(r'(?<![\w.])\d{1,18}\.\d{3,}(?:[eE][-+]?\d{1,2})?(?![\w.])')
+SECONDS = re.compile(r'(?<![\w.])(?P<number>\d{1,18}\.\d{3,}(?:[eE][-+]?\d{1,2})?)'
+                     r'(?:\s?(?P<unit>[mnuµμ]?s)\b|(?![\w.]))')
 ADDRESS = r'(?:\d{1,3}\.){3}\d{1,3}(?:[.:]\d{1,5})?'
 # Parts that are never bytes. Only three bytes with colons may look like a time.
 _NO_BYTES = re.compile(
@@ -52,6 +53,15 @@ _NO_BYTES = re.compile(
     r'|(?<![\w.])[-+]?\d+\.\d+(?:[eE][-+]?\d+)?(?![\w.])|#\d+(?=\s+[^#\s])')
 
 # Signs that may follow the bytes of a line.
+# The head of a dump, which counts its columns from 00 on.
+_RULER = re.compile(r'(?:\s{4,}|\s*(?:offset|addr)\S*\s+)'
+                    r'00 +01 +02 +03 +04 +05 +06 +07(?: +08 +09 +0A +0B +0C +0D +0E +0F)?'
+                    r'(?:\s+(?![0-9A-F]{2}\b).*)?', re.IGNORECASE)
+# A character, or its number, before the same in hexadecimal, as '16' (0x10).
+_SHOWN_BEFORE = re.compile(r"((?:'[^']{1,4}'|\\?\S) \()(0[xX][0-9A-Fa-f]{2})\)")
+# Characters one by one after a double bar, as another program shows the bytes before it.
+_SHOWN_APART = re.compile(r'(?<=[0-9A-Fa-f]{2})[ |]*\|\|(?: .)+\s*\Z')
+
 CLOSED = re.compile(r'[\s,;\])}>"\'|/*\\□]*')
 _NAME = re.compile(r'[^\W\d_]{2}')
 _LONG_NUMBER = re.compile(r'(?<!\w)(?=[A-Fa-f]*\d)[0-9A-Fa-f]{2,}(?!\w)')
@@ -129,6 +139,11 @@ class TextLayout(Protocol):
 
 def masked(line: str, with_times: bool = True) -> str:
     """Return a line with signs in place of what is never bytes."""
+    if _RULER.fullmatch(line):
+        return MASK * len(line)
+    line = _SHOWN_APART.sub(lambda match: ' ' * len(match[0]), line)
+    line = _SHOWN_BEFORE.sub(lambda match: f'{MASK * len(match[1])}{match[2]} ', line)
+
     def mask(match: re.Match[str]) -> str:
         is_bytes = match['minutes'] and not with_times
         return match[0] if is_bytes else MASK * len(match[0])

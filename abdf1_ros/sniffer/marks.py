@@ -34,6 +34,7 @@ from abdf1_ros.sniffer.layouts import ADDRESS, Piece, SECONDS, TIME_OF_DAY
 _FEW = 6  # kinds of marks; of more, those are taken together that differ in a number
 _DEPTH = 3  # lines before bytes of which one may be a mark
 
+_UNITS = {'s': 1.0, 'ms': 1e-3, 'ns': 1e-9}  # s; all others are microseconds
 _DAY = 86400.0
 _SET_BACK = 3600.0  # s; a time of day that is earlier by more than this is of the next day
 
@@ -88,7 +89,7 @@ class TextClock:
             seconds = re.sub('[,:]', '.', match['seconds'])
             time = 3600.0 * hours + 60 * int(match['minutes']) + float(seconds)
         elif match := SECONDS.search(text):
-            time = float(match[0])
+            time = float(match['number']) * _UNITS.get(match['unit'] or 's', 1e-6)
         else:
             return None
         if self.begun is None or not is_of_day and time < self.begun:

@@ -25,6 +25,7 @@ from tempfile import TemporaryDirectory
 from abdf1_ros.problems import Problem
 from abdf1_ros.sniffer.capture import Chunk, Direction
 from abdf1_ros.sniffer.dumps import Recording
+from abdf1_ros.sniffer.marks import TextClock
 from abdf1_ros.sniffer.texts import TextReader
 from hypothesis import assume, given
 from hypothesis import strategies as st
@@ -196,6 +197,16 @@ OUT, IN, UNKNOWN = Direction.OUT, Direction.IN, Direction.UNKNOWN
 # A read of an SLC, its ACK, the reply and its ACK: what went out first.
 SAID = [(OUT, '10 02 02 05 0F 00 34 12 A2 04 07 89 00 00 10 03 B7 2A'), (IN, '10 06'),
         (IN, '10 02 05 02 4F 00 34 12 41 42 43 44 10 03 11 22'), (OUT, '10 06')]
+
+
+@for_all(('unit', 'size'), [('', 1.0), (' s', 1.0), (' ms', 1e-3), ('us', 1e-6), (' µs', 1e-6),
+                            ('ns', 1e-9), (' sent', 1.0)])
+def test_time_has_the_unit_that_follows_it(unit: str, size: float) -> None:
+    clock = TextClock()
+    assert clock.read(f'1.500{unit},10') == 0.0
+    assert clock.read(f'4.000{unit},02') == pytest.approx(2.5 * size)
+
+
 # The same in good frames, of an exchange that all files of forms/ begin with.
 LONG = [(way, bytes.fromhex(text)) for way, text in [
     (OUT, '100201050f003412a204078900001003855e'), (IN, '1006'),
