@@ -156,6 +156,7 @@ def test_network_is_a_link_that_is_up_with_a_carrier_and_an_address() -> None:
 
 
 BITS, WORDS = 'std_msgs/msg/UInt8MultiArray', 'std_msgs/msg/Int16MultiArray'
+BOOL, TRIGGER = 'std_srvs/srv/SetBool', 'std_srvs/srv/Trigger'
 
 
 class Domain:
@@ -165,6 +166,7 @@ class Domain:
         self.topics: dict[str, list[str]] = {}
         self.names = [('press', '/cell'), ('paint', '/cell')]
         self.users: dict[tuple[str, str], tuple[str, str]] = {}
+        self.services: dict[str, list[str]] = {}
         self.looks = 0
 
     def get_node_names_and_namespaces(self) -> list[tuple[str, str]]:
@@ -174,6 +176,14 @@ class Domain:
     def get_topic_names_and_types(self) -> list[tuple[str, list[str]]]:
         self.looks += 1
         return list(self.topics.items())
+
+    def get_service_names_and_types(self) -> list[tuple[str, list[str]]]:
+        return list(self.services.items())
+
+    def get_service_names_and_types_by_node(
+            self, name: str, namespace: str) -> list[tuple[str, list[str]]]:
+        assert (name, namespace) == ('abdf1', '/cell')
+        return [('/cell/abdf1/polling', [BOOL])]
 
     def get_publishers_info_by_topic(self, topic: str) -> list[SimpleNamespace]:
         return [SimpleNamespace(topic_type=kind, node_namespace=namespace, node_name=name)
@@ -218,6 +228,15 @@ def test_other_type_is_told_once_and_again_when_it_comes_back(
     assert watch.look(30.0) == []
     domain.topics['/cell/abdf1/write/door'] = [BITS, 'std_msgs/msg/Bool']
     assert texts(watch.look(40.0)) == told
+
+
+def test_client_of_another_type_is_told_once(domain: Domain, graph: Graph) -> None:
+    watch = watch_of(graph)
+    domain.services = {'/cell/abdf1/polling': [BOOL, TRIGGER], '/other/polling': [BOOL, TRIGGER],
+                       '/cell/abdf1/gone': [BOOL, TRIGGER]}
+    told = [f'/cell/abdf1/polling is {BOOL}; another node uses it as {TRIGGER}, and DDS does not '
+            'connect different types']
+    assert [texts(watch.look(now)) for now in (10.0, 20.0)] == [told, []]
 
 
 def test_own_last_publisher_is_not_another_node(domain: Domain, graph: Graph) -> None:

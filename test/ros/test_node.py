@@ -465,14 +465,16 @@ def test_end_of_another_type_on_a_topic_is_told(make_bench: Benches, capfd: Outp
 
     def is_told() -> bool:
         said[0] += capfd.readouterr().err
-        return 'std_msgs/msg/Bool,' in said[0]
+        return 'std_msgs/msg/Bool,' in said[0] and 'std_srvs/srv/Trigger,' in said[0]
 
     with ros.Observer() as other:  # a participant of its own, as one has no topic with two types
         other.node.create_subscription(msg.Bool, '/abdf1/read/speed', print, 10)
+        other.node.create_client(Trigger, '/abdf1/polling')
         bench.ros.until(is_told, 'a line of the log')
     (line,) = [line for line in said[0].splitlines() if 'std_msgs/msg/Bool' in line]
     assert line.startswith('[WARN] ')
     assert '/abdf1/read/speed is std_msgs/msg/Int16MultiArray; another node uses it as' in line
+    assert '/abdf1/polling is std_srvs/srv/SetBool; another node uses it as std_srvs' in said[0]
 
 
 def test_publisher_of_our_topics_or_beside_them_is_told(

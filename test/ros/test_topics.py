@@ -112,6 +112,9 @@ class Domain:
         return [(topic, ['std_msgs/msg/UInt8MultiArray'])
                 for topic in {**self.publishers, **self.subscribers}]
 
+    def get_service_names_and_types(self) -> list[tuple[str, list[str]]]:
+        return []
+
 
 class Bench:
     """Both watches and the status of a bridge /press with ``ROWS`` in a domain."""

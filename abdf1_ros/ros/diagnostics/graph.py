@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-The graph of the domain; find nodes that have our name, or use our topics with other types.
+The graph of the domain; find nodes of our name, or that use our topics with other types.
 
 DDS has no event for such cases, so we query the graph now and then. A query takes some
 microseconds for each topic of the domain, and a process may have a hundred nodes. So all its nodes
@@ -25,6 +25,7 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator
 from collections.abc import Mapping as MappingType
+from contextlib import suppress
 from functools import partial
 from time import thread_time
 from typing import NamedTuple
@@ -34,7 +35,7 @@ from abdf1_ros.ros.diagnostics.dds import DdsWatch
 from abdf1_ros.ros.diagnostics.log import INFO, News, WARN
 from abdf1_ros.ros.topic_names import TopicNames
 from abdf1_ros.settings.mapping import Mapping
-from rclpy.node import Node
+from rclpy.node import Node, NodeNameNonExistentError
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 # Seconds between two looks for our name; short, to report a second node with our name before it
@@ -66,21 +67,25 @@ class GraphTopics(NamedTuple):
 
     - ``clashes``: the types of each topic with more than one
     - ``below_write``: the topics ``<prefix>/write/<rest>``, by prefix
+    - ``services``: the types of each service with more than one: a client uses another
     """
 
     clashes: MappingType[str, list[str]]
     below_write: MappingType[str, list[str]]
+    services: MappingType[str, list[str]]
 
     @classmethod
-    def of(cls, found: Iterable[tuple[str, list[str]]]) -> GraphTopics:
-        """Return the odd topics among topics with their types."""
+    def of(cls, found: Iterable[tuple[str, list[str]]],
+           services: Iterable[tuple[str, list[str]]]) -> GraphTopics:
+        """Return the odd topics among topics and services with their types."""
         clashes, below_write = {}, defaultdict[str, list[str]](list)
         for topic, types in found:
             if len(types) > 1:
                 clashes[topic] = types
             if '/write/' in topic:
                 below_write[topic.partition('/write/')[0]].append(topic)
-        return cls(clashes, below_write)
+        return cls(clashes, below_write, {
+            service: types for service, types in services if len(types) > 1})
 
 
 class Graph:
@@ -90,7 +95,7 @@ class Graph:
         self.dds = DdsWatch()
         self._source = source
         self._nodes: Counter[tuple[str, str]] = Counter()
-        self._topics = GraphTopics.of(())
+        self._topics = GraphTopics.of((), ())
         self._next_names = self._next_topics = 0.0
 
     def name_watch(self, node: Node, renaming: str = '-r __node:=line_2', *,
@@ -111,9 +116,18 @@ class Graph:
         """Return the odd topics: the same object until the next query."""
         if now >= self._next_topics:
             begun = thread_time()
-            self._topics = GraphTopics.of(self._source.get_topic_names_and_types())
+            self._topics = GraphTopics.of(self._source.get_topic_names_and_types(),
+                                          self._source.get_service_names_and_types())
             self._next_topics = now + max(_LEAST, _MULTIPLE * (thread_time() - begun))
         return self._topics
+
+    def offered(self, node: str) -> dict[str, str]:
+        """Return the types of the services of a node, by their full names."""
+        namespace, _, name = node.rpartition('/')
+        with suppress(NodeNameNonExistentError):  # not known yet
+            return {service: types[0] for service, types in
+                    self._source.get_service_names_and_types_by_node(name, namespace or '/')}
+        return {}
 
     def count_publishers(self, topic: str) -> int:
         """Return the number of publishers of a topic, by its full name."""
@@ -194,7 +208,7 @@ class NameWatch:
 
 class TypeWatch:
     """
-    Watches the topics of a map for nodes that use another type: DDS does not connect them.
+    Watches our topics and services for nodes that use another type: DDS does not connect them.
 
     ``our_name`` is the full name of our node. Before a reload a topic may have had another type,
     and a query may be older than that.
@@ -208,20 +222,30 @@ class TypeWatch:
             full[mapping.topic]: f'std_msgs/msg/{mapping.message_type.message}'
             for mapping in mappings for full, is_there in (
                 (names.read, mapping.reads), (names.written, mapping.writes)) if is_there}
-        self._seen: MappingType[str, list[str]] = {}
-        self._told: set[tuple[str, str]] = set()
+        self._seen: GraphTopics | None = None
+        self._told: set[tuple[str, str, str]] = set()
 
     def look(self, now: float) -> list[News]:
         """Return the wrong types that are new at the clock value ``now`` (s), each once."""
-        clashes = self._graph.topics(now).clashes
-        if clashes is self._seen:
+        seen = self._graph.topics(now)
+        if seen is self._seen:
             return []
-        self._seen = clashes
-        found = {(topic, kind) for topic in clashes.keys() & self._own.keys()
-                 for kind in clashes[topic] if kind != self._own[topic]
-                 and ((topic, kind) in self._told
-                      or self._graph.has_other(topic, kind, self._our_name))}
+        self._seen = seen
+        found = {(topic, kind, own) for topic, kind, own in _others(seen.clashes, self._own)
+                 if (topic, kind, own) in self._told
+                 or self._graph.has_other(topic, kind, self._our_name)}
+        if any(service.startswith(f'{self._our_name}/') for service in seen.services):
+            found |= {*_others(seen.services, self._graph.offered(self._our_name))}
         news, self._told = found - self._told, found
         return [News(WARN, 'types of topics', (
-            f'{topic} is {self._own[topic]}; another node uses it as {kind}, and DDS does not '
-            'connect different types')) for topic, kind in sorted(news)]
+            f'{name} is {own}; another node uses it as {kind}, and DDS does not connect different '
+            'types')) for name, kind, own in sorted(news)]
+
+
+def _others(clashes: MappingType[str, list[str]],
+            own: MappingType[str, str]) -> Iterator[tuple[str, str, str]]:
+    """Yield name, other type and our type of each of our names that has several types."""
+    for name in clashes.keys() & own.keys():
+        for kind in clashes[name]:
+            if kind != own[name]:
+                yield name, kind, own[name]
