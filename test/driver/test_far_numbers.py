@@ -20,7 +20,6 @@ from unittest.mock import Mock
 from abdf1_ros.driver.evidence import evidence_of
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome
-from abdf1_ros.messages import Message
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 import pytest
@@ -48,12 +47,6 @@ def gateway(replies_to: int | None = GATEWAY) -> OddDevice:
     return device
 
 
-def wrong(bench: DriverBench) -> list[tuple[int, ...]]:
-    """Return SRC and DST of all that was taken for no reply (2510)."""
-    return [event.args[:2] for event in bench.listener.events
-            if event.message is Message.ERR_WRONG_MESSAGE]
-
-
 def told(bench: DriverBench, station: int = PLC) -> str:
     """Return what the line has shown of a station, in short."""
     found = evidence_of(bench.network.line_mode, bench.driver.stations, station)
@@ -70,7 +63,7 @@ def test_replies_to_the_number_of_a_gateway_are_taken_from_the_second_on() -> No
     bench.run(4.0)
     assert {tuple(values) for values in bench.listener.values(WORDS)} == {(42,)}
     assert {tuple(values) for values in bench.listener.values(OTHER)} == {(43,)}
-    assert len(wrong(bench)) == 1  # one command is lost, not one for each PLC
+    assert len(bench.listener.wrong_messages()) == 1  # one command is lost, not one for each PLC
     bench.write(TARGET, [7], run=1.0)
     assert (bench.listener.outcomes(), bench.far.words[PLC, 7, 5]) == ([Outcome.WRITTEN], 7)
     assert bench.driver.stations[PLC].has_gateway
@@ -91,7 +84,7 @@ def test_nothing_is_told_where_our_station_is_the_number_of_the_gateway() -> Non
     bench.run(2.0)
     bench.write(TARGET, [7], run=1.0)
     assert bench.listener.outcomes() == [Outcome.WRITTEN]
-    assert (wrong(bench), told(bench)) == ([], '')
+    assert (bench.listener.wrong_messages(), told(bench)) == ([], '')
 
 
 def test_gateway_that_answers_diagnostics_itself_does_so_to_our_number() -> None:
@@ -100,7 +93,7 @@ def test_gateway_that_answers_diagnostics_itself_does_so_to_our_number() -> None
     bench = bench_of(device, WORDS, processor_period=0.5)
     bench.run(6.0)
     assert len(bench.listener.values(WORDS)) > 20
-    assert len(wrong(bench)) == 1
+    assert len(bench.listener.wrong_messages()) == 1
 
 
 @pytest.mark.parametrize('comes_first', [True, False])

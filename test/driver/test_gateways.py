@@ -24,7 +24,6 @@ from abdf1_ros.df1.frames import Duplex, Frame, FrameDecoder, Poll, Symbol
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome
-from abdf1_ros.messages import Message
 from abdf1_ros.settings.heartbeats import Fallback
 from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.gateway import SimulatedGateway
@@ -208,12 +207,6 @@ def address_replies(bench: Bench, address: Callable[[int], int],
         dst=address(next(count)))
 
 
-def wrong_messages(bench: Bench) -> list[tuple[int, int]]:
-    """Return SRC and DST of all that was refused as 2510."""
-    return [event.args[:2] for event in bench.listener.events
-            if event.message is Message.ERR_WRONG_MESSAGE]
-
-
 @pytest.mark.parametrize('polling', POLLING)
 @pytest.mark.parametrize('node', [GATEWAY, 0, 9])
 def test_gateway_that_fills_in_its_own_node(polling: str, node: int) -> None:
@@ -225,7 +218,7 @@ def test_gateway_that_fills_in_its_own_node(polling: str, node: int) -> None:
     assert len(bench.listener.values(bench.second)) >= 8
     # A number that we do not know is believed when the next reply has it, too.
     wrong = [] if node == GATEWAY else [(FIRST, node)]
-    assert wrong_messages(bench) == wrong
+    assert bench.listener.wrong_messages() == wrong
 
 
 @pytest.mark.parametrize('polling', POLLING)
@@ -238,7 +231,7 @@ def test_reply_to_another_node_confirms_no_write(polling: str, nodes: tuple[int,
     bench.write(bench.second, [7], run=5.0)
     assert stored(bench.plcs[1], 'N7:0') == b'\x07\x00'
     assert bench.listener.outcomes() == [Outcome.UNKNOWN]
-    assert {number for number, _ in wrong_messages(bench)} == {SECOND}
+    assert {number for number, _ in bench.listener.wrong_messages()} == {SECOND}
 
 
 def test_processors_behind_a_gateway_tell_what_they_are() -> None:

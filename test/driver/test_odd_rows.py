@@ -172,6 +172,13 @@ def values_within(bench: DriverBench, seconds: float) -> list[int]:
             for row, count in zip(GOOD, before, strict=True)]
 
 
+def write_each_second(bench: DriverBench, *rows: Mapping) -> None:
+    """Write to rows now and each second from then on: how many results there are."""
+    for row in rows:
+        bench.write(row, [len(bench.listener.results) % 1000])
+    bench.at(bench.clock() + 1.0, lambda: write_each_second(bench, *rows))
+
+
 @LONG_MODES
 @pytest.mark.parametrize('wire', WIRES)
 def test_good_rows_of_a_bad_wire_come_nearly_as_often_as_without_an_odd_row(
@@ -241,12 +248,8 @@ def test_good_rows_wait_for_one_failed_try_while_the_odd_of_twenty_are_found(
     rows = [row for pair in zip_longest(good, odd) for row in pair if row] + [COMMAND]
     bench = DriverBench(rows, network=network(mode), far=plc)
 
-    def publish() -> None:
-        bench.write(COMMAND, [len(bench.listener.results) % 1000])
-        bench.at(bench.clock() + 1.0, publish)
-
     bench.run(10.0)
-    publish()
+    write_each_second(bench, COMMAND)
     plc.fate = of_files(fate, *files)
     bench.run(80.0)
     first = [min(when for when, data in plc.tried if file_of(data) == file and when > 10.0)
@@ -296,13 +299,8 @@ def test_good_rows_wait_for_one_failed_try_while_odd_messages_are_found(
     plc = Plc(mode, fate=of_files(Fate.LOST, *files))
     bench = DriverBench([*good, *odd, COMMAND], network=network(mode), far=plc)
 
-    def publish() -> None:
-        for row in (*odd, COMMAND):
-            bench.write(row, [len(bench.listener.results) % 1000])
-        bench.at(bench.clock() + 1.0, publish)
-
     bench.run(5.0)
-    publish()
+    write_each_second(bench, *odd, COMMAND)
     bench.run(75.0)
     first = [min(when for when, data in plc.tried if file_of(data) == file) for file in files]
     for row in good:
@@ -324,11 +322,7 @@ def test_good_rows_do_not_wait_for_an_odd_fallback_and_odd_reads_together(mode: 
     plc = Plc(mode, fate=of_files(Fate.LOST, 40, *files))
     bench = DriverBench([*good, *odd, fallback, COMMAND], network=network(mode), far=plc)
 
-    def publish() -> None:
-        bench.write(COMMAND, [len(bench.listener.results) % 1000])
-        bench.at(bench.clock() + 1.0, publish)
-
-    publish()
+    write_each_second(bench, COMMAND)
     bench.run(120.0)
     found = 10.0 + 6 * a_try
     for row in good:

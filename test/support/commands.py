@@ -17,8 +17,12 @@
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 import signal
 
+from abdf1_ros.cli.plc.exports.form import Wanted
+from abdf1_ros.cli.plc.exports.imported import Import, import_map
+from abdf1_ros.settings.map_file import load_mappings
 import pytest
 from support.ros import Process
 
@@ -66,6 +70,18 @@ def call(main: Callable[[Sequence[str]], int], capsys: Output, *args: str) -> Sa
     captured = capsys.readouterr()
     assert 'Traceback' not in captured.err
     return Said(status, captured.out, captured.err)
+
+
+def made(folder: Path, text: str | bytes, wanted: Wanted | None = None,
+         name: str = 'list.csv') -> Import:
+    """Return what a list of another program becomes; its map.csv in the folder has to be good."""
+    source, target = folder / name, folder / 'map.csv'
+    source.write_bytes(text if isinstance(text, bytes) else text.encode())
+    result = import_map(str(source), wanted or Wanted())
+    target.write_text(result.text, encoding='utf-8')
+    mappings, problems = load_mappings(str(target))
+    assert problems == [] and len(mappings) == result.count
+    return result
 
 
 @contextmanager

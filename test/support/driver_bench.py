@@ -35,7 +35,7 @@ from abdf1_ros.driver.guests import Guest, GuestCommand
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome, WriteResult
 from abdf1_ros.errors import PortLost
-from abdf1_ros.messages import Event
+from abdf1_ros.messages import Event, Message
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
@@ -106,6 +106,11 @@ class Recorder:
 
     def numbers(self) -> set[int]:
         return {event.message.number for event in self.events}
+
+    def wrong_messages(self) -> list[tuple[object, ...]]:
+        """Return SRC and DST of all messages that were refused as 2510."""
+        return [event.args[:2] for event in self.events
+                if event.message is Message.ERR_WRONG_MESSAGE]
 
     def outcomes(self) -> list[Outcome]:
         """Return how the writes ended, in the order of their results."""

@@ -40,7 +40,7 @@ from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import load_network
 import pytest
 from support.cases import for_all
-from support.commands import call, Output, Said
+from support.commands import call, made, Output, Said
 from support.mappings import cell_of
 
 KEPSERVER = (
@@ -59,13 +59,10 @@ STATION_2 = Wanted(stations=(2,))
 def imported(folder: Path, text: str | bytes,
              wanted: Wanted = STATION_2) -> tuple[list[Mapping], list[str]]:
     """Return the mappings of the map that is made, which has to be good, and what is left out."""
-    source, target = folder / 'export.csv', folder / 'map.csv'
-    source.write_bytes(text if isinstance(text, bytes) else text.encode())
-    result = import_map(str(source), wanted)
-    target.write_text(result.text, encoding='utf-8')
-    mappings, problems = load_mappings(str(target))
-    assert problems == [] and len(mappings) == result.count
-    return mappings, [str(problem).removeprefix(f'{source}:') for problem in result.left_out]
+    result = made(folder, text, wanted, 'export.csv')
+    mappings, _ = load_mappings(str(folder / 'map.csv'))
+    return mappings, [str(problem).removeprefix(f'{folder / "export.csv"}:')
+                      for problem in result.left_out]
 
 
 @for_all(('row', 'expected'), [

@@ -22,30 +22,18 @@ from pathlib import Path
 
 from abdf1_ros.cli.plc.command import main
 from abdf1_ros.cli.plc.exports.form import Wanted
-from abdf1_ros.cli.plc.exports.imported import Import, import_map
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.map_file import load_mappings
 import pytest
 from support.cases import for_all
+from support.commands import made
 from support.mappings import cell_of
 
 STRANGE = ' is not understood: made Read rows (--ignore COLUMN, if it says nothing about the ' \
         'words in the PLC)'
 ORDER = 'which of its two words comes first is not in the file: made Read rows (a column Word ' \
         'Order: Low or High)'
-
-
-def made(folder: Path, text: str | bytes, wanted: Wanted | None = None,
-         name: str = 'list.csv') -> Import:
-    """Return what a file becomes; the map that is made has to be good."""
-    source, target = folder / name, folder / 'map.csv'
-    source.write_bytes(text if isinstance(text, bytes) else text.encode())
-    result = import_map(str(source), wanted or Wanted())
-    target.write_text(result.text, encoding='utf-8')
-    mappings, problems = load_mappings(str(target))
-    assert problems == [] and len(mappings) == result.count
-    return result
 
 
 def cells(folder: Path, *columns: str) -> list[tuple[str, ...]]:

@@ -26,6 +26,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
+from functools import partial
 import random
 from threading import Event
 import time
@@ -109,15 +110,8 @@ def share(setup: Setup, lines: tuple[str, str], start: Callable[[Setup, str, Exi
         theirs = replace(setup, port=str(place), cases=(case,), folder=folder)
         guests.append((start(theirs, str(place), stack), case))
         stack.callback(guests[-1][0].close)
-    tally, ended = Tally(), Event()
-    with ThreadPoolExecutor() as pool:
-        done = [pool.submit(work, guest, case, plc, rounds) for guest, case in guests]
-        watch = pool.submit(_watch, plc, tally, ended)
-        _write_own(node, plc, tally, lambda: all(future.done() for future in done))
-        ended.set()
-    watch.result()
-    counts = sum((future.result() for future in done), Counter())
-    return replace(tally, **counts)
+    return _counted(node, plc, Tally(), [
+        partial(work, guest, case, plc, rounds) for guest, case in guests])
 
 
 def crowd(setup: Setup, lines: tuple[str, str], place: str, reach: Callable[[str], Any],
@@ -137,10 +131,18 @@ def crowd(setup: Setup, lines: tuple[str, str], place: str, reach: Callable[[str
     guests = [(reach(place), case) for case in cases]
     for guest, _ in guests:
         stack.callback(guest.close)
-    tally, ended = Tally(seconds=seconds, age=node.watch_age()), Event()
+    tally = Tally(seconds=seconds, age=node.watch_age())
     end = time.monotonic() + seconds
-    with ThreadPoolExecutor(sessions + 1) as pool:
-        done = [pool.submit(_until, end, guest, case, plc) for guest, case in guests]
+    return _counted(node, plc, tally, [
+        partial(_until, end, guest, case, plc) for guest, case in guests])
+
+
+def _counted(node: NodeEnd, plc: End, tally: Tally,
+             works: Sequence[Callable[[], Counter[str]]]) -> Tally:
+    """Do each work in a thread while our node writes and beats; return the tally of all."""
+    ended = Event()
+    with ThreadPoolExecutor(len(works) + 1) as pool:
+        done = [pool.submit(each) for each in works]
         watch = pool.submit(_watch, plc, tally, ended)
         _write_own(node, plc, tally, lambda: all(future.done() for future in done))
         ended.set()
