@@ -28,7 +28,6 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, ExitStack, suppress
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import product
 import json
 import os
 from pathlib import Path
@@ -131,8 +130,33 @@ class Player:
             self._process.kill()
 
 
-class Df1dSlave:
-    """A PLC of ours that has df1d as its link: what df1d receives comes over its socket."""
+class Df1dLink:
+    """What df1d receives, over its socket; ``serve`` makes a reply of a command (link data)."""
+
+    def __init__(self, port: int, serve: Callable[[bytes], bytes]) -> None:
+        self._serve = serve
+        self._socket = socket.create_connection(('127.0.0.1', port))
+        name = b'interop'
+        self._socket.sendall(bytes((THEIRS, len(name))) + name)
+        threading.Thread(target=self._run, daemon=True).start()
+
+    def _run(self) -> None:
+        """Take SOH, length, message; say ACK; send SOH, length, reply."""
+        with self._socket.makefile('rb') as incoming:
+            while byte := incoming.read(1):
+                if byte != b'\1':
+                    continue  # df1d tells that a message of ours was acknowledged
+                size, = incoming.read(1)
+                reply = self._serve(incoming.read(size))
+                self._socket.sendall(b'\6\1' + bytes((len(reply),)) + reply)
+
+    def close(self) -> None:
+        """Hang up."""
+        self._socket.close()
+
+
+class Df1dSlave(Df1dLink):
+    """A PLC of ours that has df1d as its link."""
 
     def __init__(self, port: int, setup: Setup) -> None:
         self._family = setup.family
@@ -140,22 +164,8 @@ class Df1dSlave:
         for case in setup.cases:
             address, codec = codec_of(case, setup.family)
             self._table.create(address, codec.words)
-        self._server = Server(self._table)
-        self._socket = socket.create_connection(('127.0.0.1', port))
-        name = b'interop'
-        self._socket.sendall(bytes((THEIRS, len(name))) + name)
-        threading.Thread(target=self._serve, daemon=True).start()
-
-    def _serve(self) -> None:
-        """Take SOH, length, message; say ACK; send SOH, length, reply."""
-        with self._socket.makefile('rb') as incoming:
-            while byte := incoming.read(1):
-                if byte != b'\1':
-                    continue  # df1d tells that a message of ours was acknowledged
-                size, = incoming.read(1)
-                command = Packet.decode(incoming.read(size))
-                reply = self._server.serve(command).encode()
-                self._socket.sendall(b'\6\1' + bytes((len(reply),)) + reply)
+        server = Server(self._table)
+        super().__init__(port, lambda data: server.serve(Packet.decode(data)).encode())
 
     def read(self, case: Case) -> dict[str, Any]:
         """Return what is in the table."""
@@ -173,10 +183,6 @@ class Df1dSlave:
             for change in codec.bit_changes(address, values):
                 self._table.write_bits(*change)
         return {'done': True}
-
-    def close(self) -> None:
-        """Hang up."""
-        self._socket.close()
 
 
 class EthernetWords:
@@ -244,13 +250,24 @@ class ServedPlc(OddDevice):
 
 
 class ServerEnd:
-    """ab_server at the end of a line, as station 1: our frames are not its, nor the package's."""
+    """
+    ab_server at the end of a line, as station 1.
 
-    def __init__(self, program: str, setup: Setup) -> None:
+    With the program df1d, in full duplex, its frames are those of df1d, so all of it is by others;
+    else they are those of OddDevice.
+    """
+
+    def __init__(self, program: str, df1d_program: str, setup: Setup) -> None:
         self._stack = ExitStack()
         plc = self._stack.enter_context(ab_server(program, setup.family))
         self._words = EthernetWords(plc, setup)
         self._stack.callback(self._words.close)
+        if df1d_program:
+            number = self._stack.enter_context(
+                df1d(df1d_program, setup.port, setup.check, setup.folder))
+            self._stack.callback(Df1dLink(
+                number, lambda data: data[1::-1] + plc.execute(data[2:])).close)
+            return
         device = wired(ServedPlc, setup)
         device.execute = plc.execute
         self._stack.callback(PlainLine(setup.port, device).close)
@@ -384,26 +401,32 @@ class FarEnd:
     """
     What stands at the end of the line of a place.
 
-    It has the words of ``cases`` by family, knows these checks, and lacks the commands of the
-    runs ``not_for``.
+    It has the words of ``cases`` by family, knows these checks and modes, and lacks the commands
+    of the runs ``not_for``.
     """
 
     name: str
     start: Callable[[Setup], End]
     cases: dict[PlcType, tuple[Case, ...]]
     checks: tuple[Checksum, ...]
+    modes: tuple[str, ...] = ('Peer', 'Master', 'Via')
     not_for: tuple[str, ...] = ()
 
     @classmethod
-    def known(cls, program: str | None) -> list[FarEnd]:
-        """Return all of them; ``program`` is ab_server, if it is there."""
+    def known(cls, server: str = '', link: str = '') -> Iterator[FarEnd]:
+        """Yield all of them, those with the programs ab_server and df1d if they are there."""
         words = {family: CASES + ETHERNET_CASES[family.value]
                  for family in (PlcType.SLC, PlcType.PLC5)}
-        return [cls('simulator', PlcEnd, words, tuple(Checksum)),
-                cls('plain', PlainEnd, words, (Checksum.CRC,)),
-                *([cls('ab_server', partial(ServerEnd, program),
-                       {PlcType.SLC: AB_SERVER_CASES}, (Checksum.CRC,),
-                       ('pycomm3',))] if program else [])]  # it writes with a mask (AB)
+        yield cls('simulator', PlcEnd, words, tuple(Checksum))
+        yield cls('plain', PlainEnd, words, (Checksum.CRC,))
+        served = {PlcType.SLC: AB_SERVER_CASES}
+        masked = ('pycomm3',)  # it writes with a mask (AB), which ab_server does not know
+        if server:
+            yield cls('ab_server', partial(ServerEnd, server, ''), served, (Checksum.CRC,),
+                      not_for=masked)
+        if server and link:
+            yield cls('ab_server behind df1d', partial(ServerEnd, server, link), served,
+                      tuple(Checksum), ('Peer',), masked)
 
 
 def through_place(run: Run, mode: str, save: Path | None,
@@ -442,10 +465,11 @@ def through_places(run: Run, options: argparse.Namespace) -> bool:
     if run.ours != 'plc' or run.reach is None:
         return True
     all_good = True
-    for mode, far in product(('Peer', 'Master', 'Via'), FarEnd.known(options.ab_server)):
+    for far in FarEnd.known(options.ab_server, options.df1d):
         if run.check in far.checks and run.family in far.cases and run.name not in far.not_for:
-            all_good &= show(f'{run.text}, {mode}, {far.name}',
-                             through_place(run, mode, options.save, far))
+            for mode in far.modes:
+                all_good &= show(f'{run.text}, {mode}, {far.name}',
+                                 through_place(run, mode, options.save, far))
     return all_good
 
 
@@ -782,14 +806,15 @@ def _options() -> argparse.Namespace:
                         help='let so many of them share one such place (16)')
     parser.add_argument('--seconds', metavar='S', type=float, default=600.0,
                         help='how long (600)')
-    parser.add_argument('--ab-server', metavar='PROGRAM',
-                        help='ab_server of libplctag: with --place behind our node, too')
+    parser.add_argument('--ab-server', metavar='PROGRAM', default='',
+                        help='ab_server of libplctag; with --place it is one more PLC')
+    parser.add_argument('--df1d', metavar='PROGRAM', default='',
+                        help='df1d of libpccc; with --place it is the link of ab_server')
     products = parser.add_subparsers(dest='product', required=True)
     products.add_parser('df1py3').set_defaults(runs=df1py3_runs)
     entry = products.add_parser('libpccc')
     entry.set_defaults(runs=libpccc_runs)
     entry.add_argument('--library', required=True, help='libpccc.so.1.1')
-    entry.add_argument('--df1d', required=True, help='the program df1d')
     entry = products.add_parser('abdf1')
     entry.set_defaults(runs=abdf1_runs)
     entry.add_argument('--library', required=True, help='libAbDf1.so')

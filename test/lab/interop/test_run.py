@@ -100,7 +100,7 @@ def test_every_value_goes_to_and_fro(run: ModuleType) -> None:
 def test_every_value_goes_through_an_ethernet_place(
         run: ModuleType, mode: str, far: str) -> None:
     entry, = (each for each in run.our_runs(None) if each.check is Checksum.CRC)
-    end, = (each for each in run.FarEnd.known(None) if each.name == far)
+    end, = (each for each in run.FarEnd.known() if each.name == far)
     told = run.through_place(entry, mode, None, end)
     assert [entry for entry in told if not entry[2]] == []
     assert len(told) == len(run.CASES) + len(run.ETHERNET_CASES['SLC'])
