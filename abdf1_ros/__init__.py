@@ -69,7 +69,7 @@ if TYPE_CHECKING:
 __all__ = ['Abdf1Error', 'Client', 'ConfigurationError', 'FormatError', 'LinkError', 'PortLost',
            'Reading', 'RemoteError', 'TaggedClient', '__version__']
 
-# The modules of these names; the others are errors.
+# The modules of these names; all other names are in ``errors``.
 _HOMES = {'Client': 'client', 'ConfigurationError': 'problems', 'Reading': 'readings',
           'TaggedClient': 'tagged_client'}
 

@@ -107,7 +107,7 @@ RULES = (
          'replies to number {t.foreign} come, to commands that are not ours: a second device has '
          'the same port, by a passive splitter',
          'take it off; it may use Share', Traces(PEER, foreign=0)),
-    Rule('replies from another number than that of the station',
+    Rule('replies from a number that we have not asked',
          lambda t: t.other_source is not None and not t.replies,
          'replies come from number {t.other_source}, in place of {t.station}',
          '--station {t.other_source}, if that is the PLC; if {t.station} is a gateway, --via '
@@ -117,7 +117,7 @@ RULES = (
          lambda t: t.strays > 0 and not t.replies and not t.late,
          'replies of station {t.station} come, and none is to a command of ours: another program '
          'asks with our number, {t.own}, or something on the way has kept old replies',
-         'end the other program; switch the device server or modem on the way off and on',
+         'end that program; switch the device server or modem on the way off and on',
          Traces(PEER, acks=1, strays=1)),
     Rule('half duplex: polls are answered; commands are, but only with another check',
          lambda t: t.mode.is_master and t.takes_other_check is True,
