@@ -47,6 +47,12 @@ def is_head_of_values(line: str) -> bool:
     return line.startswith(('time,station,address,', 'time,topic,address,'))
 
 
+def is_head_of_settings(line: str) -> bool:
+    """Return True for the head of a net file or a map."""
+    cells = {cell.strip('\ufeff" ') for cell in re.split('[,;\t]', line)}
+    return 'Com_Port' in cells or cells >= {'Tag', 'Address'}
+
+
 def value_text(value: float) -> str:
     """Return a value as text, with as many digits as a float32 has."""
     return str(value) if isinstance(value, int) else f'{value:.7g}'

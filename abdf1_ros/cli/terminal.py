@@ -309,9 +309,10 @@ class _Parser(argparse.ArgumentParser):
         """Return which options an unknown option may mean."""
         written = option.partition('=')[0]
         word = written.strip('-').lower()
+        options = [name for name in self._option_string_actions if name.startswith('--')]
         meant = [f'{action.metavar} without {written}' for action in self._actions
-                 if not action.option_strings and action.dest == word] or _alike(word, [
-                     name for name in self._option_string_actions if name.startswith('--')])
+                 if not action.option_strings and action.dest in (word, f'{word}s')] \
+            or _alike(word, options)
         return f'; did you mean {" or ".join(meant)}?' if meant else ''
 
     def _surplus(self, words: Sequence[str]) -> str:

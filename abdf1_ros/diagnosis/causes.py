@@ -72,9 +72,16 @@ _NOISE = ('check shield (grounded at one end), ground, terminators and motor cab
 _ONE, _TWO = b'\x10\x06', b'\x10\x15'
 
 RULES = (
+    Rule('half duplex: our own bytes, and no others',
+         lambda t: t.echoes and not t.characters and t.mode.is_master and not t.settings,
+         'our own bytes come back, and nothing else: TX and RX are connected, or the adapter '
+         'echoes and station {t.on_line} is silent',
+         'take the cable off the PLC: if they still come, and the adapter has one pair of wires, '
+         'look at station {t.on_line}: power, number, plug and settings; otherwise at the cable',
+         Traces(echoes=True)),
     Rule('our own bytes, and no others',
          lambda t: t.echoes and not t.characters,
-         _COMES_BACK, _CABLE, Traces(echoes=True)),
+         _COMES_BACK, _CABLE, Traces(PEER, echoes=True)),
     Rule('polls, or messages to a station, that are not ours',
          lambda t: bool(t.masters),
          'another master polls {t.stations} of this line, and two masters destroy their messages',

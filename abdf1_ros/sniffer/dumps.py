@@ -36,9 +36,10 @@ from abdf1_ros.sniffer.ethernet_ip import chunks_of, CSP, DEVICE_SERVERS, SeenPa
 from abdf1_ros.sniffer.packet_files import is_packet_file, PacketFile
 from abdf1_ros.sniffer.pcapng import LINK_TYPE
 from abdf1_ros.sniffer.texts import TextProblem, TextReader
-from abdf1_ros.text import counted, first, is_head_of_values
+from abdf1_ros.text import counted, first, is_head_of_settings, is_head_of_values
 
 _BLOCK = 4096
+_HEAD = 9  # lines that are looked at, if those before the last are comments
 _GZIP = b'\x1F\x8B'
 # The longest text line in bytes: no program writes longer lines, and a file without line ends,
 # such as /dev/zero, must not fill the memory.
@@ -93,7 +94,13 @@ class Recording:
     def _text(self) -> Iterator[Chunk]:
         lines = self._lines()
         begin = next(lines, '')
-        lines = chain([begin], lines)
+        head = [begin]
+        while head[-1].startswith('#') and not is_capture_line(begin) and len(head) < _HEAD:
+            head.append(next(lines, ''))
+        lines = chain(head, lines)
+        if is_head_of_settings(head[-1]):
+            raise TextProblem(f'{self._name}:1', 'the settings of a line, or the rows of a map, '
+                                                 'and no bytes: "check" reads them')
         if is_head_of_values(begin):
             raise TextProblem(f'{self._name}:1', 'values, not bytes: "plc plot" draws them')
         if is_capture_line(begin):

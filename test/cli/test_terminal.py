@@ -348,6 +348,8 @@ def test_character_that_was_pasted_is_named_in_faults_and_names_of_files(
                                        'in 1,2,3'),
     ('?', 'STATION', ['1', '2'], '2; it takes one STATION'),
     ('?', 'STATION', ['--station', '1'], '--station; did you mean STATION without --station?'),
+    ('?', 'STATIONS', ['1', '--station', '1'], '--station 1; did you mean STATIONS without '
+                                               '--station?'),
     *((many, 'ADDRESS', ['a', '--net', 'n', 'b'], 'b; --net takes one value; each ADDRESS stands '
        'beside the others, before or after all options') for many in '+*')])
 def test_words_that_are_too_many_are_told_where_they_belong(

@@ -129,6 +129,13 @@ def test_symbols_alone_are_df1() -> None:
     assert only_eot.is_df1 and diagnose(only_eot).rule.asks is Decider.OTHER_CHECK
 
 
+def test_silence_behind_an_adapter_that_echoes_leads_to_the_station() -> None:
+    line = ('>', poll(2)), ('<', poll(2)), ('>', poll(2)), ('<', poll(2))
+    found = diagnose(seen(*line, station=2, echoes=True))
+    assert 'station 2 is silent' in found.cause and 'Mode' not in found.step
+    assert 'half duplex' in diagnose(seen(*line, mode=PEER, echoes=True)).step
+
+
 def test_characters_are_counted_in_words() -> None:
     assert diagnose(Traces(characters=1, first=b'\xA7')).cause.startswith('1 character came, ')
 

@@ -142,6 +142,14 @@ def test_kinds_of_files_are_told_apart(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize('head', [
+    'Station,Mode,Com_Port,Baud', '# Our line\n# here\nMode;Com_Port', 'Tag\tCommand\tAddress',
+    '\ufeffAddress,Tag'])
+def test_net_file_and_map_lead_to_check(tmp_path: Path, head: str) -> None:
+    with pytest.raises(Problem, match='x:1: the settings of a line, .*: "check" reads them'):
+        chunks(tmp_path / 'x', f'{head}\n5,10 06,10 05\n'.encode())
+
+
+@pytest.mark.parametrize('head', [
     'time,station,address,value', 'time,station,address,tag,value',
     'time,station,address,tag,value,reason', 'time,topic,address,values'])
 def test_file_of_values_leads_to_the_program_that_draws_them(tmp_path: Path, head: str) -> None:

@@ -26,6 +26,7 @@ from datetime import datetime
 import json
 import math
 from pathlib import Path
+import re
 from typing import NamedTuple, TextIO
 
 from abdf1_ros.cli.plc.log_file import COLUMNS, is_end_of_gap
@@ -36,6 +37,7 @@ from abdf1_ros.text import shown
 
 _RECORDED = ('time', 'topic', 'address', 'values')
 _OF_SPREADSHEETS = str.maketrans(';\t', ',,', '"')
+_WATCHED = re.compile(r'\d\d:\d\d:\d\d\.\d{3}  \S')
 _STRING_FILE = 'ST'
 _NOT_FINITE = {'nan', 'inf', '-inf'}
 
@@ -90,6 +92,10 @@ def samples(path: str, remark: Callable[[str], None]) -> Iterator[Sample]:
                 raise Problem(f'{path}:1', (
                     'a spreadsheet has saved this file, and may have changed its times and '
                     'numbers; give the file as "plc log" wrote it'))
+            if _WATCHED.match(first):
+                raise Problem(f'{path}:1', (
+                    'has the text of "plc watch" for a screen; log with "plc log --to FILE", and '
+                    'draw that file'))
             raise Problem(f'{path}:1', (
                 'is not a CSV or JSON lines of "plc log", nor a CSV of recorder.py: it begins '
                 f'with "{shown(first)}"' if first else 'the file is empty'))

@@ -469,6 +469,15 @@ def test_row_whose_plc_a_merged_cell_names_is_left_out_with_the_cure(
     assert 'ignored: 1 rows of other PLCs\n' in said.out
 
 
+def test_descriptions_in_several_columns_are_joined(tmp_path: Path) -> None:
+    text = ('Address\tSymbol\tAddress Description 1\tAddress Description 2\n'
+            'N7:0\tSPEED\tBELT\tSPEED\n')
+    source = tmp_path / 'list.txt'
+    source.write_text(text, encoding='utf-8')
+    made = import_map(str(source), Wanted())
+    assert made.lines[-1].endswith(',BELT SPEED') and not made.notes
+
+
 def test_print_of_a_data_file_is_no_list(tmp_path: Path) -> None:
     head = 'Offset,0,1,2,3\n'
     assert 'has values beside addresses' in refusal(

@@ -153,6 +153,7 @@ def test_missing_words_are_named(capsys: Output) -> None:
     (f'{HEAD}\n2026-03-01T14:05+01:00,1,N7:0,,5,\n01.03.26,1,N7:0,,5,\n', ':3: this row cannot'),
     (f'{HEAD}\n2026-03-01T14:05+01:00;1;N7:0;;5;\n', ':2: this row cannot be read: it has 1 col'),
     ('{"time": "2026-03-01T14:05+01:00", "value": 1}\n', ":1: this row cannot be read: 'station'"),
+    ('14:05:09.250  N7:0  889\n', ':1: has the text of "plc watch" for a screen; log with'),
     ('# abdf1_ros capture 1\n', ':1: bytes, not values: "sniff --html" draws them'),
     ('time,topic,address,values\n1,2\n', ':2: this row cannot be read: it has 2 columns')])
 def test_other_file_is_refused(tmp_path: Path, capsys: Output, content: str, told: str) -> None:

@@ -198,9 +198,9 @@ LIST = Form(
             Role.TYPE: 'datatype type datentyp typ typededonnées typededonnee tipo tipodedato '
                        'tipodedatos tipodati rawdatatype rawtype vartype variabletype tagtype '
                        'devicedatatype nativetype',
-            Role.DESCRIPTION: 'description* desc comment* beschreibung* bemerkung* kommentar* '
+            Role.DESCRIPTION: '*description* desc *comment* beschreibung* bemerkung* kommentar* '
                               'libellé* libelle* documentation* descripción* descripcion* '
-                              'descrizione* descrição* tagdescription bezeichnung* désignation* '
+                              'descrizione* descrição* bezeichnung* désignation* '
                               'designation* bedeutung service remark* note* tooltip',
             Role.ACCESS: 'access command lectureécriture lesenschreiben clientaccess '
                          'accessrights accessright accessmode accesstype '
