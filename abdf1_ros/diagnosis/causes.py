@@ -66,7 +66,7 @@ class Rule:
 
 
 _COMES_BACK, _CABLE = COMES_BACK.split('; ')
-_OTHER_SETTINGS = '"plc detect" tries other settings'
+_OTHER_SETTINGS = '"plc detect" tries other settings; another parity only with --parity'
 _NOISE = ('check shield (grounded at one end), ground, terminators and motor cables; then use a '
           'lower baud rate')
 _ONE, _TWO = b'\x10\x06', b'\x10\x15'

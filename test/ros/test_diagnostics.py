@@ -622,7 +622,8 @@ def test_link_tells_cause_and_next_step_of_a_missing_answer(bench: Bench,
     counters.chars_received = 40
     assert cause_of(bench) == (
         '40 characters came, and no answer that makes sense: another baud rate or parity, noise, '
-        'or another protocol', '"plc detect" tries other settings')
+        'or another protocol', '"plc detect" tries other settings; another parity only with '
+        '--parity')
     stations.heard(1, NOW)
     stations[1].replies = 3
     assert cause_of(bench)[0] == (

@@ -472,10 +472,8 @@ def test_row_whose_plc_a_merged_cell_names_is_left_out_with_the_cure(
 def test_descriptions_in_several_columns_are_joined(tmp_path: Path) -> None:
     text = ('Address\tSymbol\tAddress Description 1\tAddress Description 2\n'
             'N7:0\tSPEED\tBELT\tSPEED\n')
-    source = tmp_path / 'list.txt'
-    source.write_text(text, encoding='utf-8')
-    made = import_map(str(source), Wanted())
-    assert made.lines[-1].endswith(',BELT SPEED') and not made.notes
+    result = made(tmp_path, text)
+    assert result.lines[-1].endswith(',BELT SPEED') and not result.notes
 
 
 def test_print_of_a_data_file_is_no_list(tmp_path: Path) -> None:
