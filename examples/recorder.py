@@ -16,7 +16,8 @@
 """
 Record the values that a bridge reads from PLCs, in a CSV file for a spreadsheet.
 
-A row is one message: time of publication (UTC), topic below ~/read/, PLC address, and values. For
+A row is one message: time of publication (UTC), topic below ~/read/, PLC address, and values. An
+array has a cell for each value, so rows differ in length: read them with Python's csv.reader. For
 replay, plots, or topics of other nodes use rosbag2: docs/recording.md has the commands.
 
 Exit status: 0 after Ctrl-C or --seconds, 1 if the bridge is not found, 2 for bad arguments or a

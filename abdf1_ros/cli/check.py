@@ -491,3 +491,7 @@ def _bound(bound: Bound) -> dict[str, object]:
 
 def _remark(remark: Remark) -> dict[str, object]:
     return {'kind': remark.kind.value, 'station': remark.station, 'text': remark.text}
+
+
+if __name__ == '__main__':
+    raise SystemExit(main())

@@ -394,3 +394,7 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
         except ValueError as error:
             parser.error(f'--tcp {error}')
     return options
+
+
+if __name__ == '__main__':
+    raise SystemExit(main())

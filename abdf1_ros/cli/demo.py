@@ -575,3 +575,7 @@ def tell_steps(demo: Demo, seconds: float) -> int:
         demo.close()
     print(verdict or f'demo: all {demo.last_step} steps were seen as they should be', flush=True)
     return status
+
+
+if __name__ == '__main__':
+    raise SystemExit(main())

@@ -483,3 +483,7 @@ def input_of(descriptor: int) -> bytes | None:
         return os.read(descriptor, 4096)
     except OSError:  # EIO: this process is in the background
         return None
+
+
+if __name__ == '__main__':
+    raise SystemExit(main())

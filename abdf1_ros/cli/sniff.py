@@ -505,3 +505,7 @@ def _tell_lost(tap: Tap, trace: Trace | None) -> None:
 
 
 _say = partial(tell, 'sniff')
+
+
+if __name__ == '__main__':
+    raise SystemExit(main())

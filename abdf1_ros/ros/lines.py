@@ -388,3 +388,7 @@ def _make(given: Sequence[str]) -> Program:
                 f'{place}: {name} has a section in {first} too: it is one line, with the later of '
                 'two values'))
     return Lines(chosen([*names], node.wanted), node, arguments)
+
+
+if __name__ == '__main__':
+    raise SystemExit(main())

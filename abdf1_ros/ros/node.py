@@ -38,3 +38,7 @@ def main(args: Sequence[str] | None = None) -> int:
 
 def _make(given: Sequence[str]) -> Program:
     return Runner([Line(BridgeNode(arguments=Arguments.of(given)))])
+
+
+if __name__ == '__main__':
+    raise SystemExit(main())

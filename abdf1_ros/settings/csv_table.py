@@ -339,6 +339,9 @@ def _check_cells(place: Place, cells: list[str], names: list[str], columns: dict
                              f'{_DELIMITERS[delimiter]} between them, outside of quotes')
     for number, cell in enumerate(cells, 1):
         where = replace(place, cell=number)
+        if cell and number < len(names) and not names[number - 1]:
+            raise Problem(where, f'"{shown(cell)}": this column has no name in the first row; '
+                                 'name it, or leave it out (in pandas index=False)')
         if cell and not ''.join(names[number - 1:number]):
             raise Problem(where, f'"{shown(cell)}" has no column; quote a cell that contains the '
                                  'delimiter')

@@ -18,6 +18,7 @@ from importlib import import_module
 from io import BytesIO, TextIOWrapper
 import os
 from pathlib import Path
+import runpy
 import shlex
 import shutil
 import signal
@@ -204,6 +205,17 @@ def test_help_of_a_program_with_ros_needs_no_ros(name: str, tmp_path: Path) -> N
                               capture_output=True, text=True, timeout=PATIENCE)
         assert (done.returncode, done.stdout[:len(said)], done.stderr[:len(fault)]) == (
             status, said, fault)
+
+
+@pytest.mark.filterwarnings('ignore:.*found in sys.modules')
+@pytest.mark.parametrize('name', sorted(COMMANDS))
+def test_module_of_a_command_is_one_too(
+        name: str, monkeypatch: pytest.MonkeyPatch, capsys: Output) -> None:
+    monkeypatch.setattr(sys, 'argv', [name, '--version'])
+    with pytest.raises(SystemExit) as end:
+        runpy.run_module(COMMANDS[name][0], run_name='__main__')
+    assert not end.value.code
+    assert capsys.readouterr().out == f'abdf1_ros {package_version()}\n'
 
 
 @pytest.mark.parametrize('name', sorted(COMMANDS))

@@ -177,7 +177,9 @@ LONG = 'x' * 100
     ('Tag,Address\na,1\ntag,ADDRESS\nb,2\n', [
         'FILE:3: the names of the columns stand here again; once is enough']),
     ('Tag,Address\na,N7:0,5\n', [f'FILE:2:3: {OUTSIDE}']),
-    ('Tag,,Address\na,5,N7:0\n', [f'FILE:2:2: {OUTSIDE}']),
+    *((content, [f'FILE:2:{cell}: "5": this column has no name in the first row; name it, or '
+                 'leave it out (in pandas index=False)'])
+      for content, cell in (('Tag,,Address\na,5,N7:0\n', 2), (',Tag,Address\n5,a,N7:0\n', 1))),
     ('Tag,Address\nb,N7:1\n# c\na,N7:0,,5,6\nc,N7:2,5\n', [
         f'FILE:4:4: {OUTSIDE}', f'FILE:5:3: {OUTSIDE}']),
     (f'Tag\na,{LONG}x\n', [

@@ -332,3 +332,7 @@ def _print(picture: Callable[[int], list[TextLine]]) -> None:
         number = _COLOURS.get(line.style)
         print(colour(line.text, 30 + number, sys.stdout) if number else line.text)
     print(flush=True)
+
+
+if __name__ == '__main__':
+    raise SystemExit(main())

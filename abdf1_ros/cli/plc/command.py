@@ -40,3 +40,7 @@ def main(args: Sequence[str] | None = None) -> int:
     chosen = verb(options.command)
     return run_command('plc', partial(chosen.run, options), EXIT_INTERRUPTED,
                        getattr(chosen, 'UNREAD_STATUS', 0))
+
+
+if __name__ == '__main__':
+    raise SystemExit(main())
