@@ -36,7 +36,6 @@ from abdf1_ros.sniffer.capture import is_capture_line
 from abdf1_ros.text import shown
 
 _RECORDED = ('time', 'topic', 'address', 'values')
-_OF_SPREADSHEETS = str.maketrans(';\t', ',,', '"')
 _WATCHED = re.compile(r'\d\d:\d\d:\d\d\.\d{3}  \S')
 _STRING_FILE = 'ST'
 _NOT_FINITE = {'nan', 'inf', '-inf'}
@@ -88,10 +87,6 @@ def samples(path: str, remark: Callable[[str], None]) -> Iterator[Sample]:
         else:
             if is_capture_line(first):
                 raise Problem(f'{path}:1', 'bytes, not values: "sniff --html" draws them')
-            if first.translate(_OF_SPREADSHEETS) == ','.join(COLUMNS):
-                raise Problem(f'{path}:1', (
-                    'a spreadsheet has saved this file, and may have changed its times and '
-                    'numbers; give the file as "plc log" wrote it'))
             if _WATCHED.match(first):
                 raise Problem(f'{path}:1', (
                     'has the text of "plc watch" for a screen; log with "plc log --to FILE", and '

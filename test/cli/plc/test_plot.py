@@ -144,8 +144,6 @@ def test_missing_words_are_named(capsys: Output) -> None:
     ('', ':1: the file is empty'), (f'{HEAD}\n', ': has no row below its head'),
     ('time,station,address,value\n', ':1: is not a CSV or JSON lines of "plc log", nor a CSV of '
      'recorder.py: it begins with "time,station,address,value"'),
-    ('time;"station";address;tag;value;reason\n', ':1: a spreadsheet has saved this file, and may '
-     'have changed its times'),
     ('plc,station=1 integer=1i 1\n', ':1: is not a CSV or JSON lines'),
     ('\x10\x02\xff', ':1: the file is empty'),
     (f'{HEAD}\n2026-03-01 14:05,1,N7:0,,5,\n', ':2: this row cannot be read: 2026-03-01 14:05 has '
