@@ -148,8 +148,11 @@ def _uses(end: AnsweringEnd, answers: Iterable[Callable[[Symbol], None]]) -> Fai
     """Give answers that are not replies; return how one of them was used, None if none was."""
     answered, command = _follows(end, end.next_command(), end.finish)
     unanswered, command = _follows(end, command, end.acknowledge)
-    if is_as_late(answered, unanswered) or end.has_further:
-        raise Skipped('not judged: the next command comes as soon after no reply as after a reply')
+    if end.has_further:
+        raise Skipped('not judged: the next command comes before the reply to the last one')
+    if is_as_late(answered, unanswered):
+        raise Skipped('not judged: the next command comes as late after a reply as after none: '
+                      'the target reads too seldom, or takes no reply')
     for answer in answers:
         for _ in range(2):  # so that the target does not count us as inactive
             _, command = _follows(end, command, end.finish)

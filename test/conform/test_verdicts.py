@@ -247,6 +247,8 @@ NOT_TRIED: list[tuple[Target, list[Habit] | None, str]] = [
     (Target.PEER, [Habit.NO_REPETITION], 'nak-limit'),
     (Target.CLIENT, [Habit.NO_REPETITION], 'nak-limit'),
     (Target.CLIENT, [Habit.ACK_TIMEOUT_OF_8], 'enquiry-limit'),
+    (Target.CLIENT, [Habit.TAKES_NO_REPLY], 'other-reply-ignored'),
+    (Target.MASTER, [Habit.SENDS_TWO], 'other-reply-ignored'),
     (Target.MASTER, [Habit.NO_REPETITION], 'repetitions-limited'),
     (Target.RADIO_CLIENT, [Habit.SLOW], 'bad-reply-ignored other-reply-ignored')]
 

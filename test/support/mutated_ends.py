@@ -106,6 +106,7 @@ Habit = Enum('Habit', [
     'STOPS_AFTER_10',  # commands
     'TAKES_SHORT_REPLY', 'WAITS_FOR_EVER',  # for the answer to a poll
     'ENDS_AT_OTHER_CODE',  # the command as failed
+    'TAKES_NO_REPLY',
     'WRITES_BACK',  # each word that it reads
     # Of a radio modem node or client.
     'ACKNOWLEDGES', 'ANSWERS_SYMBOLS', 'REPEATS_AFTER_NAK', 'REPLIES_FOR_OTHERS',
@@ -741,7 +742,7 @@ class _Asker:
     def is_reply(self, data: bytes, command: bytes) -> bool:
         """Tell whether a message is taken for the reply to a command (M 6-3, 6-7)."""
         has = self._wire.has
-        if len(data) < 6:
+        if len(data) < 6 or has(Habit.TAKES_NO_REPLY):
             return has(Habit.TAKES_SHORT_REPLY)
         is_code = data[2] == command[2] | 0x40 or has(Habit.TAKES_ANY_CODE)
         is_reply = (data[0] == command[1] or has(Habit.TAKES_ANY_DESTINATION)) and (

@@ -56,12 +56,17 @@ Reached = Collection[tuple[str, int]]
 
 @dataclass(frozen=True, slots=True)
 class Site:
-    """A place that can be mutated: node ``at`` of a source, in the order of a walk."""
+    """
+    A place that can be mutated: node ``at`` of a source, in the order of a walk.
+
+    ``line`` is the file and number of the line that shows it.
+    """
 
     operator: str
     source: int
     owner: str
     at: int
+    line: tuple[str, int]
     edit: Edit
 
 
@@ -203,9 +208,10 @@ def sites(end: str, reached: Reached) -> list[Site]:
         numbers = {id(node): at for at, node in enumerate(ast.walk(tree))}
         for owner, function in _functions(tree, names):
             for node in _code(function):
-                found += [Site(change.operator, source, owner, numbers[id(node)], change.edit)
+                at = numbers[id(node)]
+                found += [Site(change.operator, source, owner, at, line, change.edit)
                           for change in _changes(node)
-                          if (FILES[source], change.shown.lineno) in reached]
+                          if (line := (FILES[source], change.shown.lineno)) in reached]
     return found
 
 
@@ -386,16 +392,16 @@ def _change_constant(node: ast.AST, random: Random) -> None:
 
 
 def mutate(random: Random, end: str, reached: Reached) -> Mutation:
-    """Draw a mutation of an end: first its kind, then its place."""
+    """Draw a mutation of an end: first its line, then what is done to it."""
     found = sites(end, reached)
-    operator = random.choice(sorted({site.operator for site in found}))
-    site = random.choice([site for site in found if site.operator == operator])
+    line = random.choice(sorted({site.line for site in found}))
+    site = random.choice([site for site in found if site.line == line])
     trees = list(SOURCES)
     tree = trees[site.source] = copy.deepcopy(SOURCES[site.source])
     before = ast.unparse(tree).splitlines()
     site.edit(list(ast.walk(tree))[site.at], random)
     after = ast.unparse(ast.fix_missing_locations(tree)).splitlines()
-    return Mutation(operator, site.owner, *_difference(before, after), (trees[0], trees[1]))
+    return Mutation(site.operator, site.owner, *_difference(before, after), (trees[0], trees[1]))
 
 
 def _difference(before: list[str], after: list[str]) -> tuple[str, str]:
