@@ -211,6 +211,16 @@ class AskingEnd(ABC):
         if symbol is None or symbol.kind is not SymbolKind.ACK:
             raise Failed('DLE ACK for a good message', str(symbol or 'silence'))
 
+    def expect_acknowledged(self) -> None:
+        """Expect DLE ACK for the first copy of a good message, in one of some tries."""
+        for number in range(2 * MOST_TRIES):
+            symbol = self.offer(self.command())
+            if symbol is not None and symbol.kind is SymbolKind.ACK:
+                return
+            if number % 2:  # in turns, as a device may lose each n-th answer
+                self.settle()  # a message that waits may have filled a buffer
+        raise Failed('DLE ACK for a good message', str(symbol or 'silence'))
+
     @abstractmethod
     def collect(self, acknowledge: bool = True) -> bytes:
         """Wait for a message and acknowledge it; return its link data."""

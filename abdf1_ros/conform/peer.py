@@ -41,7 +41,7 @@ def _answer(end: PeerEnd, frame: bytes, kind: SymbolKind) -> None:
 
 @case('A good message is acknowledged with DLE ACK.', 'M 4-7 to 4-9', _PEER)
 def message_acknowledged(end: PeerEnd) -> None:
-    end.deliver(end.command())
+    end.expect_acknowledged()
 
 
 @case('A message with a wrong check is answered with DLE NAK.', 'M 4-7 to 4-9', _PEER)

@@ -49,7 +49,7 @@ def poll_idle(end: MasterEnd) -> None:
 
 @case('A good message is acknowledged with DLE ACK.', 'KF2 4-31', _SLAVE)
 def message_acknowledged(end: MasterEnd) -> None:
-    end.deliver(end.command())
+    end.expect_acknowledged()
 
 
 @case('A slave sends its reply as answer to a poll, not by itself.', 'KF2 4-31', _SLAVE)

@@ -49,6 +49,7 @@ Habit = Enum('Habit', [
     'DOES_ALL_COMMANDS', 'DOES_ALL_FUNCTIONS', 'NO_IDENTITY', 'READS_SHORT', 'READS_LONG',
     'READS_ZEROS_BEYOND', 'WRITES_NOTHING', 'MASKS_NOTHING', 'REFUSES_AREA', 'TEXT_IS_N7_0',
     'LOSES_DOUBLED_BYTE',  # 10, of what it takes
+    'REFUSES_FIRST',  # copy of each message, as if it were full
     'SENDS_NO_STX', 'READS_BEYOND_LAST', 'TAKES_CMD_0C', 'TAKES_FNC_E7',  # as a read
     'SLOW',  # each response and reply 300 ms late
     'LATE_REPLY',  # 300 ms after the command
@@ -136,6 +137,7 @@ class Wire:
         self._next = 0
         self._said = self._embedded = b''
         self._has_dropped = False
+        self._copied = b''
         self._receiver = self._receive()
         next(self._receiver)
 
@@ -188,6 +190,11 @@ class Wire:
 
     def has(self, habit: Habit) -> bool:
         return habit in self.habits
+
+    def refuses(self, data: bytes) -> bool:
+        """Tell whether a message is refused because it comes for the first time."""
+        before, self._copied = self._copied, data
+        return self.has(Habit.REFUSES_FIRST) and data != before
 
     def noise(self) -> None:
         """Take note of a byte outside of any symbol."""
@@ -485,7 +492,7 @@ class MutatedSlave(Wire):
             self._queue.append((self.now, data))
         if len(data) < 6 or self.has(Habit.SMALL_PACKETS) and len(data) > 110:
             return
-        if not is_broadcast and self._plc.is_full:
+        if not is_broadcast and (self._plc.is_full or self.refuses(data)):
             return
         if self._plc.is_duplicate(data):
             if not self.has(Habit.DUPLICATE_WITHOUT_ACK):
@@ -611,7 +618,7 @@ class _FullDuplex(Wire):
             return self.refused(data)
         shortest = 7 if self.has(Habit.REFUSES_SIX_BYTES) else \
             1 if self.habits & {Habit.TAKES_SHORT, Habit.TAKES_SHORT_REPLY} else 6
-        if self.is_full or len(data) < shortest or \
+        if self.is_full or self.refuses(data) or len(data) < shortest or \
                 len(data) > 110 and self.has(Habit.SMALL_PACKETS):
             return self._respond(_NAK)
         is_duplicate = self.is_duplicate(data)
