@@ -24,7 +24,7 @@ from __future__ import annotations
 from abdf1_ros.conform.case import case, Target
 from abdf1_ros.conform.codec import SymbolKind
 from abdf1_ros.conform.ends import AskingEnd
-from abdf1_ros.conform.wire import Skipped
+from abdf1_ros.conform.wire import Failed, Skipped
 
 _ANSWERING = (Target.SLAVE, Target.PEER)
 _EVERYBODY = (*_ANSWERING, Target.RADIO)
@@ -47,6 +47,8 @@ def duplicate_discarded(end: AskingEnd) -> None:
     if symbol is not None and symbol.kind is SymbolKind.MESSAGE:
         end.taken(symbol)
         raise Skipped('two replies to a message sent twice: duplicate detection is off')
+    if symbol is not None:
+        raise Failed('DLE ACK, and nothing after it', str(symbol))
 
 
 @case('A message with another TNS is not a duplicate.', _SOURCE, *_EVERYBODY)

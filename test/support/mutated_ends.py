@@ -49,7 +49,7 @@ Habit = Enum('Habit', [
     'DOES_ALL_COMMANDS', 'DOES_ALL_FUNCTIONS', 'NO_IDENTITY', 'READS_SHORT', 'READS_LONG',
     'READS_ZEROS_BEYOND', 'WRITES_NOTHING', 'MASKS_NOTHING', 'REFUSES_AREA', 'TEXT_IS_N7_0',
     'LOSES_DOUBLED_BYTE',  # 10, of what it takes
-    'REFUSES_FIRST',  # copy of each message, as if it were full
+    'ACKS_DUPLICATE_TWICE', 'REFUSES_FIRST',  # copy of each message, as if it were full
     'SENDS_NO_STX', 'READS_BEYOND_LAST', 'TAKES_CMD_0C', 'TAKES_FNC_E7',  # as a read
     'SLOW',  # each response and reply 300 ms late
     'LATE_REPLY',  # 300 ms after the command
@@ -497,6 +497,8 @@ class MutatedSlave(Wire):
         if self._plc.is_duplicate(data):
             if not self.has(Habit.DUPLICATE_WITHOUT_ACK):
                 self._respond()
+            if self.has(Habit.ACKS_DUPLICATE_TWICE):
+                self._respond()
             return
         waiting = len(self._queue) + (self._held is not None)
         limit = 1 if self.has(Habit.ONE_MESSAGE_ONLY) else 99 if self.has(Habit.NEVER_FULL) else 3
@@ -624,6 +626,8 @@ class _FullDuplex(Wire):
         is_duplicate = self.is_duplicate(data)
         if not (is_duplicate and self.has(Habit.DUPLICATE_WITHOUT_ACK)):
             self._respond(_ACK, is_followed=not is_duplicate)
+        if is_duplicate and self.has(Habit.ACKS_DUPLICATE_TWICE):
+            self._respond(_ACK)
         if not is_duplicate and len(data) >= (1 if self.has(Habit.TAKES_SHORT_REPLY) else 6):
             self.execute(data)
 
