@@ -80,6 +80,7 @@ from support.virtual_line import Noise, QUIET, VirtualLine
 STEP = 0.05  # s
 GUESTS = range(33_000, 33_600)  # what only guests write: more than a heartbeat counts to
 OTHERS = 34_000  # what comes into a word from another network
+FOREIGN = 34_100  # what another program writes once into the word of a heartbeat
 LARGEST = 31_000  # of what is published
 _LEAST_COMMAND = 10  # bytes: no poll
 _HEADER = 6  # bytes before the data of a command
@@ -1009,6 +1010,10 @@ class World(DriverBench):
         watched = self.plcs[station]
         watched.other = watched.other % 30_000 + 7
         watched.set(BEAT, watched.other)
+
+    def write_foreign(self, station: int) -> None:
+        """Let another program write once to the word of the heartbeat."""
+        self.plcs[station].set(BEAT, FOREIGN)
 
     def overwrite(self, station: int) -> None:
         """Let another network write to the first output."""

@@ -36,7 +36,18 @@ from abdf1_ros.driver.write import Outcome, WriteResult
 from abdf1_ros.plan.bounds import MODE_PERIOD
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.simulator.ladder import Lamp
-from support.world import Executed, GUESTS, OTHERS, SAFE, Said, Sent, STEP, WatchedPlc, World
+from support.world import (
+    Executed,
+    FOREIGN,
+    GUESTS,
+    OTHERS,
+    SAFE,
+    Said,
+    Sent,
+    STEP,
+    WatchedPlc,
+    World,
+)
 
 _LEAST_ZERO = 0.5  # s
 _LEAST_LIFE_SIGN = 1.0  # s
@@ -45,6 +56,7 @@ _REWRITTEN = 5.0  # s after which a fallback is written again
 _READ_BACK = 'read back: the PLC holds'
 _READ_VALUE = re.compile(r'(\d+) was read where')
 _READ_BACK_WITHIN = 2.0  # s, of a late value to its read
+_LONGEST_REPLY = 400  # characters, with the poll for it
 _REPEATED = 10.0  # s, until a number of a command may come again
 _NEVER_EXECUTED = {Outcome.NOT_SENT, Outcome.REFUSED, Outcome.SUPERSEDED, Outcome.FAILED}
 
@@ -1033,6 +1045,36 @@ class Foreign(Rule):
             self.demand(not is_ours, text, 'at', when, last)
 
 
+class Noticed(Rule):
+    text = 'after a foreign value was read a heartbeat is 0 before it counts (19)'
+
+    def __init__(self, world: World) -> None:
+        super().__init__(world)
+        self._read: dict[int, float] = {}  # when one was read that no 0 has followed, by station
+        self._zero: defaultdict[int, float] = defaultdict(lambda: -math.inf)
+
+    def sent(self, entry: Sent) -> None:
+        if not entry.tag.startswith('beat') or entry.value in GUESTS:
+            return
+        if not entry.value:
+            self._zero[entry.station] = entry.when
+            self._read.pop(entry.station, None)
+        read = self._read.get(entry.station, math.inf)
+        within = 10 * _LONGEST_REPLY / self.world.plant.baud
+        self.demand(entry.when < read + within, entry, 'but one was read at', read)
+
+    def stand(self) -> None:
+        world = self.world
+        for station, watched in world.plcs.items():
+            row = world.rows.get(f'beat_{station}')
+            if row is None or world.line.now <= max(world.ill[station], world.ill[0]):
+                continue
+            when, word = watched.answered(row.address, row.address.offset, world.line.now) \
+                or (-math.inf, 0)
+            if word == FOREIGN and when > self._zero[station]:
+                self._read.setdefault(station, when)
+
+
 class OneOwner(Rule):
     text = 'beside another writer of its word a heartbeat ends with 0 (19)'
 
@@ -1077,7 +1119,8 @@ class OneOwner(Rule):
 RULES: tuple[type[Rule], ...] = (
     Results, Stands, Ages, Stamps, Turns, Values, Guards, Withheld, Beats, BeatsAfterFallbacks,
     Order, Outputs, OneResult, Crowds, Probes, Unheard, Queued, AfterRun, Held, ReadOnly, Guests,
-    GuestAges, OnTheWire, View, Fresh, Served, Rungs, Answers, ReadBack, Repeats, Taken, Foreign)
+    GuestAges, OnTheWire, View, Fresh, Served, Rungs, Answers, ReadBack, Repeats, Taken, Foreign,
+    Noticed)
 
 
 class Judge:

@@ -18,8 +18,9 @@ Make one mistake at a time in the code that decides what is written, and look fo
 ``drawn.py --seed 1`` draws 30: a comparison turned, a term left out, an event ignored (a statement
 deleted), a time not compared. ``drawn.py --lot carried.json`` makes those that people have written
 down. Each is made in a copy of the tree. First all stories with one deviation are told, then the
-pairs of ``--pairs`` scenes. It prints for each the story that shows it, or how many stories came
-out otherwise without breaking a rule. One that changes none of them changes nothing here.
+pairs of ``--pairs`` scenes. It prints for each the story that shows it, or what a scene reaches
+only with or only without it, or how many stories came out otherwise beside that. One that changes
+none of them changes nothing here.
 """
 
 from __future__ import annotations
@@ -190,6 +191,8 @@ def judge(names: Iterable[str], deviations: int, ledgers: Path) -> tuple[str, in
             one = walk.broken[0]
             story = text_of(one.story).replace('\n', ' | ')
             return f'{name}, {story!r}: {one.broken[:100]}', others
+        if before.reached and (changed := before.reached ^ walk.reached):
+            return f'{name}, reached or not any more: {min(changed)}', others
     return '', others
 
 
@@ -209,8 +212,10 @@ def keep(ledgers: Path) -> None:
     """Keep what comes of the stories without a mistake."""
     for name in SMALL:
         ledger = Ledger(None)
-        for _ in Walk(SCENES[name]).to(1, told=ledger.add):
+        walk = Walk(SCENES[name])
+        for _ in walk.to(1, told=ledger.add):
             pass
+        ledger.reached = walk.reached
         ledger.write(_ledger(ledgers, name))
 
 

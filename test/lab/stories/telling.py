@@ -55,8 +55,9 @@ _LONGEST = 12.0  # s without anything new, until all is at rest
 _LAST = 0.03  # s before a write can land no more
 _GLANCE = 0.01  # s
 _REFRESHED = 3.0  # s after which each Fallback that stands has been written again
-# Messages until all is as at first, and as long as a clock that was ahead is remembered.
-_CALLS, _CALLS_AHEAD = 12, 42
+# Messages until all is as at first; and as long as a clock that was ahead is remembered, or a 0
+# stands after a foreign value.
+_CALLS, _CALLS_LONG = 12, 42
 _RECOVERED = 2  # deviations from which on nobody looks whether all is as at first: it takes long
 
 
@@ -256,7 +257,7 @@ class Telling:
     def be_ahead(self, argument: str) -> None:
         """Let the clock of the publishers be ahead by so many seconds, for a second."""
         self.world.clocks.lead = float(argument)
-        self._calls = _CALLS_AHEAD
+        self._calls = _CALLS_LONG
         self.world.at(self.world.line.now + 1.0, lambda: setattr(self.world.clocks, 'lead', 0.0))
 
     def set_clock(self, argument: str) -> None:
@@ -329,6 +330,12 @@ class Telling:
     def overwrite(self, argument: str) -> None:
         """Let another program write the output, unseen: the Fallback is written again for that."""
         self.world.overwrite(1)
+
+    def write_foreign(self, argument: str) -> None:
+        """Let another program write once to the heartbeat; the 0 may stand for long after it."""
+        self.world.write_foreign(1)
+        self._last_news = self._mode_seen_at = self.world.line.now + self.scene.plant.period / 1000
+        self._calls = _CALLS_LONG
 
     def unplug(self, argument: str) -> None:
         """Lose the port for so many seconds."""
@@ -522,6 +529,7 @@ _EVENTS: dict[str, Callable[[Telling, str], None]] = {
     'message': Telling.publish, 'equal': Telling.publish_equal, 'publish': Telling.publish_other,
     'ahead': Telling.be_ahead, 'set': Telling.set_clock, 'guest': Telling.ask,
     'before': Telling.deliver_from_before, 'overwrite': Telling.overwrite,
+    'foreign': Telling.write_foreign,
     'silent': Telling.fall_silent, 'program': Telling.stop_program, 'download': Telling.download,
     'still': Telling.stand_still, 'executor': Telling.hang_executor, 'kill': Telling.kill,
     'crowd': Telling.crowd, 'queued': Telling.be_queued, 'unplug': Telling.unplug,

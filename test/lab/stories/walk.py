@@ -170,11 +170,16 @@ def signature(broken: str) -> str:
 
 
 class Ledger:
-    """What came of each story, as a short hash, by its text; of this tree, or of another."""
+    """
+    What came of each story, as a short hash, by its text; of this tree, or of another.
+
+    ``reached`` is what all of them have reached.
+    """
 
     def __init__(self, path: Path | None) -> None:
-        self._hashes: dict[str, str] = json.loads(
-            path.read_text(encoding='utf-8')) if path is not None else {}
+        kept = json.loads(path.read_text(encoding='utf-8')) if path is not None else {}
+        self._hashes: dict[str, str] = kept.get('stories', {})
+        self.reached: set[str] = {*kept.get('reached', ())}
 
     def add(self, one: Told) -> None:
         """Keep what came of a story."""
@@ -189,7 +194,8 @@ class Ledger:
         return self._hashes.get(text_of(one.story)) != _hash_of(one)
 
     def write(self, path: Path) -> None:
-        path.write_text(json.dumps(self._hashes, indent=0), encoding='utf-8')
+        kept = {'stories': self._hashes, 'reached': sorted(self.reached)}
+        path.write_text(json.dumps(kept, indent=0), encoding='utf-8')
 
 
 def _hash_of(one: Told) -> str:
