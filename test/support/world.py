@@ -210,13 +210,18 @@ class Plant:
 
 
 class Sent(NamedTuple):
-    """A word that the driver has put on the line for a PLC; ``is_again``: sent once more."""
+    """
+    A packet with words of a row, from ``at`` of it on, that the driver has sent to a PLC.
+
+    ``is_again``: it is sent once more.
+    """
 
     when: float
     station: int
     tag: str
     value: int
     is_again: bool
+    at: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -545,6 +550,8 @@ class World(DriverBench):
         self.holds = 0.0  # how often the gateway keeps a write for a while
         # What becomes of a command that has come to a PLC, or to the gateway before it.
         self.pass_on: PassOn = self._keep_some
+        # Tells whether a gateway keeps a write of another value to a row, by its tag.
+        self.may_land: Callable[[str, int], bool] = lambda tag, value: False
         self.losses: Losses | None = None
         self.wire = hashlib.sha256()
         self._values = dict.fromkeys(self.rows, 0)
@@ -784,7 +791,8 @@ class World(DriverBench):
             is_again = tail == self._last_sent.get(station)
             self._last_sent[station] = tail
             self._senders[meant.tag, meant.value] = self.drivers
-            self.sent.append(Sent(start, station, meant.tag, meant.value, is_again))
+            self.sent.append(
+                Sent(start, station, meant.tag, meant.value, is_again, meant.at))
 
     def _hear(self, data: bytes) -> bytes:
         self.wire.update(b'%f>' % self.line.now + data)

@@ -215,6 +215,7 @@ class Stands(Rule):
         now, again = self.world.line.now, row.write_again / 1000
         _, value = self.world.keys[int(result.request)]
         last, (held, seen) = self._last.get(row.tag), self._held.get(row.tag, (None, 0.0))
+        self.demand(not self.world.may_land(row.tag, value), result, 'another value may land')
         self.demand(last is not None and last.value == held == value, result, last)
         assert last is not None
         patience = row.fallback.after / 1000 if row.fallback else self.world.plant.write_timeout
@@ -239,7 +240,7 @@ class Ages(Rule):
         if tag[0] not in 'wf' or entry.value in GUESTS:
             return
         if entry.value == SAFE:
-            if tag not in self._stand and not entry.is_again:
+            if tag not in self._stand and not entry.is_again and not entry.at:
                 self._fallbacks[tag] = entry.when
             return
         published = world.published[tag, entry.value]
@@ -486,6 +487,7 @@ class Beats(Rule):
         self._driver: dict[str, int] = {}
         self._stood = max(_LEAST_ZERO, world.plant.period / 1000)
         self._sent: dict[str, Sent] = {}
+        self._late: dict[str, Executed] = {}  # own values that came late over a 0
 
     def sent(self, entry: Sent) -> None:
         """Judge what a heartbeat vouches for when it goes out (3 c, d)."""
@@ -510,9 +512,14 @@ class Beats(Rule):
                         entry, 'without 0 although nothing came at', gap)
 
     def executed(self, entry: Executed) -> None:
-        if not entry.tag.startswith(('beat', 'other')) or entry.is_late:
+        if not entry.tag.startswith(('beat', 'other')):
             return
         tag, value = entry.tag, entry.value
+        if entry.is_late:
+            if entry.value and entry.before == 0 and entry.driver >= self.world.process:
+                self._late[tag] = entry
+            return
+        late = self._late.pop(tag, None)
         if value in GUESTS:
             if entry.before == 0:
                 self._over.add(tag)
@@ -534,6 +541,8 @@ class Beats(Rule):
             self.demand(not last or value in (last, *following), entry, 'after', last)
             if not last:
                 stood = self._stood if is_ours else _LEAST_ZERO
+                self.demand(late is None or late.value != entry.before, entry,
+                            'over a late value:', late)
                 self.demand(entry.when - self._zero[tag] >= stood - 1e-6, entry,
                             '0 stood since', self._zero[tag])
         if entry.is_told:

@@ -204,7 +204,8 @@ def test_finding_of_a_read_that_is_not_true_is_found() -> None:
     rule.told(result)
     with pytest.raises(Broken):
         rule.told(replace(result, detail='read back: the PLC holds another value'))
-    rule.sent(entry._replace(when=world.published['w0_1', 1] + result.latency))
+    told = world.published['w0_1', 1] + result.latency
+    rule.sent(entry._replace(when=told - 0.001))
     with pytest.raises(Broken):
         rule.told(result)
 

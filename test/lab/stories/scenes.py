@@ -17,7 +17,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Mapping as MappingType
+from dataclasses import dataclass, field, replace
 from enum import Enum
 
 from abdf1_ros.pccc.families import parse_address
@@ -101,6 +102,7 @@ class Scene:
     meets: tuple[str, ...] = ()
     first: str = 'same'  # of RELOADS: the rows before the first reload
     rows: Change = list
+    given: MappingType[str, str] = field(default_factory=dict)  # what happens in each story
     equals: tuple[float, ...] = ()  # s, when the last message of the output comes once more
     called: tuple[str, ...] = ('w0_1',)
     is_refreshed: bool = False  # Fallbacks that stand are written again, each second
@@ -172,15 +174,15 @@ _SMALL = (
                   'reload same', 'polling 0.4'),
           fates=('no reply', 'refused', 'kept last', 'kept 1', 'sts last')),
     Scene('little again via', _plant('Gateway', after=1500), slots=(0.05, 1.3), until=2.4,
-          equals=(1.2, 1.6), rows=_AGAIN,
+          equals=(0.94, 1.2, 1.6), rows=_AGAIN,
           events=('before speed last', 'guest speed', 'guest unknown'),
           fates=('not delivered', 'told undelivered', 'kept last')),
     Scene('little bits', _plant(kind='SLC'), slots=(0.9, 1.3), until=2.4, rows=_bits,
           called=('w0_1', 'free_1'), fates_of='fw',
           events=('publish free_1', 'message', 'reload same'),
           fates=('no reply', 'kept last', 'kept 1')),
-    Scene('little long', _plant(kind='SLC'), slots=(0.9, 1.35), until=2.4, rows=_long,
-          events=('message', 'guest speed', 'still 0.4', 'polling 0.4'),
+    Scene('little long', _plant(kind='SLC'), slots=(0.9, 1.35), until=2.4,
+          rows=_long, events=('message', 'guest speed', 'still 0.4', 'polling 0.4'),
           fates=('no reply', 'lost', 'refused', 'kept last', 'kept 1')),
     Scene('little clocks', _plant(), _CALLED, (0.7, 1.1, 1.7), until=2.4,
           events=('ahead 0.06', 'ahead 0.3', 'set 1.0', 'set -1.0', 'still 0.4', 'message 0.5')),
@@ -194,6 +196,21 @@ _SMALL = (
           until=2.4, equals=(1.2,), rows=_AGAIN,
           events=('guest speed 255', 'guest speed 2', 'silent 0.7', 'reload same', 'end 0.3'),
           fates=('no reply', 'kept last', 'sts 1')),
+    Scene('little hang', _plant(requires=None, period=1500), (), (0.8, 1.75), fates_of='h',
+          until=2.4, given={'at 0.05': 'executor 2.4'}, is_read_back=False,
+          events=('guest beat', 'guest speed', 'reload same'), fates=('no reply', 'kept last')),
+    Scene('little zero', _plant(), (0.8, 1.1, 1.4, 2.05, 2.4, 2.8), (1.9, 2.2), fates_of='h',
+          until=2.6, is_read_back=False, events=('guest beat', 'polling 0.4'),
+          fates=('no reply', 'kept last')),
+    Scene('little last', _plant(), slots=(1.0, 1.25), given={'at 1.35': 'reload same'},
+          fates_of='fgh', until=2.4, events=('message', 'guest speed', 'silent 0.7'),
+          fates=('no reply', 'refused', 'kept last', 'sts 1')),
+    Scene('little race', _plant(), (), (0.5, 0.53), fates_of='f', until=2.0,
+          given={'at 0.55': 'polling 0.4'}, events=('slow 0.04', 'guest speed', 'message'),
+          fates=('no reply', 'kept last')),
+    Scene('little calls', _plant(after=8000), _slots(0.3, 5.2, 0.35), (1.7,), until=2.4,
+          fates_of='fh', given={'write 1': 'no reply', 'write 2': 'no reply'},
+          events=('guest speed',), fates=('no reply', 'refused')),
     Scene('little crowd', _plant(), slots=(0.78, 0.9, 1.3), fates_of='f', until=2.4,
           events=('crowd 0.5', 'message', 'kill 0.3', 'reload same', 'polling 0.4'),
           fates=('no reply', 'kept last'), meets=('crowd 0.1',)),

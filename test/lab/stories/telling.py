@@ -27,10 +27,11 @@ from collections.abc import Mapping as MappingType
 from dataclasses import dataclass
 from functools import partial
 import math
+from unittest import mock
 
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.kernel.fallback import FallbackState
-from abdf1_ros.driver.write import Outcome
+from abdf1_ros.driver.write import Outcome, Write
 from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.plan.bounds import MODE_PERIOD
 from abdf1_ros.settings.heartbeats import HAND_OVER, LONGEST_END
@@ -54,6 +55,7 @@ _FROM_BEFORE = GUESTS[-20:]  # what other programs wrote before the port was ope
 _LONGEST = 12.0  # s without anything new, until all is at rest
 _LAST = 0.03  # s before a write can land no more
 _GLANCE = 0.01  # s
+_COUNTS_WITHIN = 3.0  # s, and the time of a transaction: two tries, a pause, a 0 that stands
 _REFRESHED = 3.0  # s after which each Fallback that stands has been written again
 # Messages until all is as at first; and as long as a clock that was ahead is remembered, or a 0
 # stands after a foreign value.
@@ -89,7 +91,7 @@ class Telling:
         self.points: list[tuple[str, tuple[str, ...]]] = []
         self.world = World(scene.plant, 1, lambda rows: RELOADS[scene.first](scene.rows(rows)))
         self._places = {row.tag: row.address for row in scene.rows(scene.plant.mappings())}
-        self.world.pass_on = self._pass_on
+        self.world.pass_on, self.world.may_land = self._pass_on, self._may_land
         self._judge = Judge(self.world)
         self._story = story
         self._writes = 0
@@ -102,6 +104,7 @@ class Telling:
         self._ill_until = -math.inf
         self._last_news = self._mode_seen_at = 0.0
         self._calls = _CALLS
+        self._counted_at = 0.0  # that heartbeats did, or need not
 
     def came(self) -> Iterator[str]:
         """Return what PLCs have executed, and then all results."""
@@ -117,11 +120,14 @@ class Telling:
             world.at(when, self._publish)
         for when in scene.equals:
             world.at(when, self._publish_equal)
+        for where, what in scene.given.items():
+            if where.startswith('at '):
+                world.at(float(where[len('at '):]), partial(self._do, what))
         for when in scene.slots:
             world.at(when, partial(self._event, f'at {when}', scene.events))
         self._wait(max((*scene.messages, *scene.equals, *scene.slots)) + STEP)
         while why := self._why_unsettled():
-            if world.line.now > self._last_news + _LONGEST:
+            if world.line.now > self._last_news + _LONGEST + scene.plant.after / 1000:
                 raise Broken('Rest', f'not at rest: {why}', world)
             self._wait(STEP)
         self._demand_belief()
@@ -147,6 +153,24 @@ class Telling:
                 self._mark()
             world.run(STEP)
             self._judge.look()
+            self._demand_count()
+
+    def _demand_count(self) -> None:
+        """Demand that heartbeats count soon while messages come and nothing is wrong (3, 11)."""
+        world, now = self.world, self.world.line.now
+        missing = [row.tag for row in world.rows.values()
+                   if row.is_heartbeat and world.plcs[row.station].held(row) == 0
+                   and row.condition and row.condition.names]
+        needed = (world.plant.requires or 0) / 1000
+        is_well = world.driver.is_online and self._calls == _CALLS \
+            and not world.driver.kernel.end.is_asked and all(
+                now < world.came.get(tag, -math.inf) + needed for tag in self.scene.called)
+        if not missing or not is_well:
+            self._counted_at = now
+        since = max(self._counted_at, self._ill_until, self._last_news, self._mode_seen_at,
+                    world.opened)
+        if now > since + _COUNTS_WITHIN + world.longest:
+            raise Broken('Counts', f'{missing} stand still, and nothing is wrong', world)
 
     def _mark(self, seconds: float = 0.0) -> None:
         """Keep that something is wrong, for so many seconds: no bound holds then."""
@@ -161,7 +185,7 @@ class Telling:
 
     def _choose(self, where: str, options: Sequence[str]) -> str:
         self.points.append((where, tuple(options)))
-        return self._story.get(where, '')
+        return self._story.get(where, '') or self.scene.given.get(where, '')
 
     def _event(self, where: str, options: Sequence[str]) -> None:
         if event := self._choose(where, options):
@@ -229,6 +253,13 @@ class Telling:
         else:
             world.at(world.line.now + world.held_for - _LAST, partial(self._land, kept))
 
+    def _may_land(self, tag: str, value: int) -> bool:
+        """Tell whether a gateway keeps another value of a row, and the driver can know of it."""
+        return any(kept.tag == tag and not kept.is_done
+                   and int.from_bytes(kept.command.data[-2:], 'little') != value
+                   and (kept.driver >= self._first_driver or self._is_gateway_known)
+                   for kept in self._kept)
+
     def _land(self, kept: Kept) -> None:
         if not kept.is_done:
             kept.is_done = True
@@ -248,6 +279,18 @@ class Telling:
     def publish_other(self, tag: str) -> None:
         """Publish a message of another row."""
         self._say(tag)
+
+    def publish_slowly(self, argument: str) -> None:
+        """Publish a message whose thread stands still so long after it was found to be good."""
+        inbox, world = self.world.driver._inbox, self.world  # noqa: SLF001
+        put = inbox.put
+
+        def put_late(write: Write) -> bool:
+            world.at(world.line.now + float(argument), partial(put, write))
+            return True
+
+        with mock.patch.object(inbox, 'put', put_late):
+            self._say(_SPEED)
 
     def _say(self, tag: str, late: float = 0.0, *, is_equal: bool = False) -> None:
         if tag not in self.world.rows:
@@ -304,7 +347,7 @@ class Telling:
         self._ail(argument, lambda: self._turn(Setting.PROGRAM), self._run_again)
 
     def download(self, argument: str) -> None:
-        """Bring back what the PLC had half a second after the start, and run again."""
+        """Bring back other words, and run again after so many seconds."""
         watched = self.world.plcs[1]
         watched.saved = dict.fromkeys(watched.places.values(), 7)
         self._ail(argument, lambda: self.world.download(1), self._run_again)
@@ -367,13 +410,13 @@ class Telling:
             self._judge.over()
             self.kill(argument)
 
-        self._wind_down(LONGEST_END, ended)
+        self._wind_down(LONGEST_END, ended, is_final=True)
 
     def hand_port_over(self, argument: str) -> None:
         """Give the port to other programs for so many seconds."""
         def ended() -> None:
             self.world.lose_port('released')
-            self._open_again(float(argument))
+            self._open_again(float(argument), is_resumed=True)
 
         self._wind_down(HAND_OVER, ended)
 
@@ -392,12 +435,13 @@ class Telling:
         safe = {(row.extent, row.fallback) for row in rows}
         self._wind_down(HAND_OVER, ended, lambda row: (row.extent, row.fallback) not in safe)
 
-    def _open_again(self, seconds: float) -> None:
+    def _open_again(self, seconds: float, *, is_resumed: bool = False) -> None:
         world, process = self.world, self.world.process
 
         def open_again() -> None:
             if world.process == process and not world.driver.is_online:
-                world.driver.kernel.end.resume()
+                if is_resumed:
+                    world.driver.kernel.end.resume()
                 self._cut_off()
                 world.open()
                 world.opened = world.line.now
@@ -405,19 +449,22 @@ class Telling:
         world.at(world.line.now + seconds, open_again)
 
     def _wind_down(self, limit: float, then: Callable[[], None],
-                   is_meant: Callable[[Mapping], bool] = lambda row: True) -> None:
+                   is_meant: Callable[[Mapping], bool] = lambda row: True, *,
+                   is_final: bool = False) -> None:
         """Write all 0s and Fallbacks, wait for them, judge what the log names, and go on."""
         world, driver = self.world, self.world.driver
         if driver.kernel.end.is_asked or world.line.now < world.away or not world.is_alive:
             raise Pointless
         world.ended = world.line.now
-        driver.kernel.end.wind_down()
+        driver.kernel.end.wind_down(is_final=is_final)
         world.line.wake(driver.machine)
 
         def look() -> None:
             if world.driver is not driver:
                 return  # it was killed
             waits = driver.kernel.end.has_to_wait(is_open=driver.is_online, is_meant=is_meant)
+            if waits and driver.is_online and world.commands:
+                self._demand_no_reads()
             if not waits or world.line.now >= world.ended + limit:
                 self._demand_named()
                 then()
@@ -425,6 +472,15 @@ class Telling:
                 world.at(max(world.away, world.line.now + _GLANCE), look)
 
         look()
+
+    def _demand_no_reads(self) -> None:
+        """Demand that nothing is read at an end (5), but for a read that was under way then."""
+        world = self.world
+        when, _, command = world.commands[-1]
+        begun = max(world.ended, world.opened, self._ill_until) + STEP
+        if when > begun and not is_write(command) \
+                and not any(command.data == asked.data for asked in world.asked):
+            raise Broken('Unread', f'{command} was sent at {when:.3f} (5)', world)
 
     def _demand_named(self) -> None:
         """Demand that the end names each word that is not safe; none if nothing was wrong (5)."""
@@ -527,6 +583,7 @@ _STATUS = {'refused': 0x10, 'not': 0x02, 'sts': 0x02}
 
 _EVENTS: dict[str, Callable[[Telling, str], None]] = {
     'message': Telling.publish, 'equal': Telling.publish_equal, 'publish': Telling.publish_other,
+    'slow': Telling.publish_slowly,
     'ahead': Telling.be_ahead, 'set': Telling.set_clock, 'guest': Telling.ask,
     'before': Telling.deliver_from_before, 'overwrite': Telling.overwrite,
     'foreign': Telling.write_foreign,
