@@ -350,11 +350,20 @@ class OpenLine(_Closes):
 class BlockingClient(_Closes):
     """What all clients have: their line, with the state of its stations, and its end."""
 
-    # Other names cannot be set: a later ``client.timeout = 5`` would have no effect.
-    __slots__ = '_line', '__weakref__'
+    __slots__ = '__dict__', '__weakref__', '_line'
 
     def __init__(self, line: OpenLine) -> None:
         self._line = line
+
+    if not TYPE_CHECKING:  # with it mypy would let all names pass
+
+        def __setattr__(self, name: str, value: object) -> None:
+            """Refuse what would have no effect, as ``client.timeout = 5``; tests may patch."""
+            is_ours = type(self).__module__.startswith(f'{__package__}.')
+            if is_ours and not hasattr(type(self), name):
+                raise AttributeError(f'a {type(self).__name__} has no {name} that can be set; '
+                                     'give settings when you make it')
+            super().__setattr__(name, value)
 
     def __repr__(self) -> str:
         state = self._line.state if self._line.is_open else 'closed'

@@ -34,7 +34,7 @@ from threading import Thread
 import time
 from types import FrameType
 from typing import Any
-from unittest.mock import Mock
+from unittest.mock import Mock, patch
 
 from abdf1_ros.cli.sniff import main as sniff
 from abdf1_ros.client import Client
@@ -432,9 +432,22 @@ def test_client_shows_its_port_and_takes_no_setting_later(port: str) -> None:
     with client(port, plc_type='SLC') as plc:
         plc.read('N7:0')
         assert repr(plc) == f'<Client of {port}: open>'
-        with pytest.raises(AttributeError, match='timeout'):
+        with pytest.raises(AttributeError, match='^a Client has no timeout that can be set; give'):
             plc.timeout = 5  # type: ignore[attr-defined]
+        with patch.object(plc, 'read', return_value=7):
+            assert plc.read('N7:0') == 7
+        assert plc.read('N7:0') == 0
     assert repr(plc) == f'<Client of {port}: closed>'
+
+    class Press(Client):
+
+        def __init__(self) -> None:
+            self.name = 'press'
+            super().__init__(port, duplex='half')
+
+    with Press() as press:
+        press.timeout = 5  # type: ignore[attr-defined]
+        assert (press.name, press.read('N7:0')) == ('press', 0)
 
 
 def test_forgotten_close_is_a_warning_where_python_shows_it(port: str) -> None:
