@@ -17,8 +17,9 @@ Try for hours what the tests try for minutes, each time with something new.
 
 The parts, each for its share of the time: ``properties`` (all property tests, with new examples),
 ``tests`` (the tests that are too long for ``make test``), ``simulate`` (plants of any kind),
-``stories`` (all pairs of faults of tiny plants), ``rehearsal`` (hosts that die, and their spares),
-``fuzz`` (all targets, from a corpus that is kept), ``faults`` (each fault of a byte, and pairs),
+``stories`` (all pairs of faults of tiny plants), ``explorer`` (the kernel by itself),
+``rehearsal`` (hosts that die, and their spares), ``fuzz`` (all targets, from a corpus that is
+kept), ``faults`` (each fault of a byte, and pairs),
 ``noise`` and ``soak`` (every mode, in virtual time), ``bridge`` (node and simulator as processes,
 with faults) and ``kills``. What they say is in the folder of ``--work``, with the corpus and the
 examples that failed. At the end stands what was tried. The same seed draws the same, as far as
@@ -110,6 +111,9 @@ def parts(work: Path) -> dict[str, Part]:
         'stories': Part(0.1, lambda seed, left: script(
             'stories/walk.py', f'--seed={seed}', '--deviations=2', f'--seconds={left:.0f}'),
             {'stories': r'(?m)^(\d+) stories, '}),
+        'explorer': Part(0.05, lambda seed, left: script(
+            'explorer/explore.py', f'--seed={seed}', '--steps=7', '--events=3', '--faults=2',
+            f'--seconds={left:.0f}'), {'stories': r' states, (\d+) stories'}),
         'rehearsal': Part(0.1, lambda seed, left: script(
             'rehearsal/run.py', f'--seed={seed}', f'--seconds={left:.0f}',
             *['--discovery-server'] * (seed % 2)),
