@@ -112,6 +112,7 @@ class Handshake(Node):
         self._crowd = ''  # which topic has had two living publishers
         self._state: tuple[int, int] | None = None
         self._states = 0  # number of received states
+        self._heard = 0.0  # when the last one came
         self._result = 'no result has come'
         self._is_at_rest = False  # a 0 has been confirmed
         self.create_subscription(
@@ -152,7 +153,8 @@ class Handshake(Node):
             print(f'not begun: {self._crowd}')
             return NOT_BEGUN
         if not self._spin(lambda: self._is_in_control, begin_within):
-            print('not begun: ROS is not in control of the PLC; a person has to press reset there')
+            print('not begun: ROS is not in control of the PLC. If /diagnostics says that the '
+                  'heartbeat counts, a person has to press reset there; otherwise it says why not')
             return NOT_BEGUN
         if self._state[0] != self._state[1]:
             print(f'not begun: the PLC is busy with job {self._state[0]}')
@@ -174,6 +176,10 @@ class Handshake(Node):
         self._requests.wait_for_all_acked(Duration(seconds=1))
         if self._crowd:
             print(f'job {number}: unknown: {self._crowd}')
+            return UNKNOWN
+        silence = time.monotonic() - self._heard
+        if step is Step.BUSY and silence > self._patience:
+            print(f'job {number}: unknown: no job_state has come for {silence:.0f} s')
             return UNKNOWN
         print(f'job {number}: {step.value}')
         return {Step.DONE: DONE, Step.WAITING: NOT_BEGUN, Step.BUSY: UNKNOWN}[step]
@@ -216,6 +222,7 @@ class Handshake(Node):
         busy, done = message.data
         self._state = busy, done
         self._states += 1
+        self._heard = time.monotonic()
 
     def _take_control(self, message: UInt8MultiArray) -> None:
         self._is_in_control = bool(message.data[0])

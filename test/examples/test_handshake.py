@@ -16,6 +16,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+import re
 import runpy
 import threading
 
@@ -41,7 +42,8 @@ def run(plc: Plc, state: list[int], *args: str, result: str = 'written',
 
     ``result`` is that of each; what is not written does not come to the PLC. ``control`` is the
     bit that says whether the PLC uses what is written. ``stub`` is the state that a second node
-    publishes: from the begin on, or from the first request on if it says that job 5 is done.
+    publishes: from the begin on, or from the first request on if it says that job 5 is done. An
+    empty ``state`` is not published.
     """
     lease = Duration(seconds=1)
     latched = QoSProfile(
@@ -55,7 +57,8 @@ def run(plc: Plc, state: list[int], *args: str, result: str = 'written',
         controls.publish(UInt8MultiArray(data=control or [1]))
 
         def publish() -> None:
-            states.publish(Int16MultiArray(data=state))
+            if state:
+                states.publish(Int16MultiArray(data=state))
             if stub is not None and (stub != [5, 5] or requests):
                 stubs.publish(Int16MultiArray(data=stub))
 
@@ -81,7 +84,8 @@ def run(plc: Plc, state: list[int], *args: str, result: str = 'written',
             for name, text, value in told:
                 results.publish(DiagnosticStatus(name=name, message=text, values=[
                     KeyValue(key='value', value=f'[{value}]')]))
-            states.publish(Int16MultiArray(data=before))  # the bridge had read it already
+            if before:
+                states.publish(Int16MultiArray(data=before))  # the bridge had read it already
 
         observer.node.create_subscription(Int16MultiArray, '/fake/write/job_request', take, 10)
         with Process(EXAMPLE, '--node', '/fake', '--patience', '1', *args) as example:
@@ -137,8 +141,9 @@ def test_nothing_is_asked_for_while_ros_is_not_in_control() -> None:
         lambda request, state: None, [4, 4], '--control', 'control', '--begin-within', '0.5',
         control=[0])
     assert (status, requests) == (1, [])
-    assert lines == ['not begun: ROS is not in control of the PLC; a person has to press reset '
-                     'there']
+    assert lines == ['not begun: ROS is not in control of the PLC. If /diagnostics says that the '
+                     'heartbeat counts, a person has to press reset there; otherwise it says why '
+                     'not']
 
 
 def test_job_whose_control_is_lost_is_taken_back() -> None:
@@ -171,6 +176,16 @@ def test_job_that_is_not_done_in_time_is_unknown() -> None:
 
     status, lines, _ = run(begin, [0, 0], '--begin-within', '10', '--done-within', '0.5')
     assert (status, lines[-1]) == (3, 'job 1: the PLC is busy with it')
+
+
+def test_job_is_unknown_if_its_state_does_not_come_any_more() -> None:
+    """As when the bridge has died."""
+    def begin_and_die(request: int, state: list[int]) -> None:
+        state[:] = [] if state[:1] != [0] else [request, 0]
+
+    status, lines, _ = run(begin_and_die, [0, 0], '--begin-within', '10', '--done-within', '4')
+    assert (status, lines[1]) == (3, 'job 1 has begun')
+    assert re.fullmatch(r'job 1: unknown: no job_state has come for [2-9] s', lines[-1])
 
 
 @for_all(('busy', 'done', 'number'), [
