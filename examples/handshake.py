@@ -174,6 +174,8 @@ class Handshake(Node):
         self._requests.publish(Int16MultiArray(data=[0]))
         # The last message would be lost with its publisher if the program ended at once.
         self._requests.wait_for_all_acked(Duration(seconds=1))
+        # The event of a second publisher comes after its message.
+        self._spin(lambda: bool(self._crowd), _PERIOD)
         if self._crowd:
             print(f'job {number}: unknown: {self._crowd}')
             return UNKNOWN
