@@ -96,7 +96,8 @@ _DOWN = Context(prec=1, rounding=ROUND_DOWN)
 _NEAR = 2.0  # in units of --answer-time: an earlier DLE ENQ may look like an answer
 
 _NOTHING_TRIED = 'no rule was tried: each case has its reason'
-_NOBODY = 'no byte was received: check cable, port, speed and power'
+_NOBODY = 'no byte was received: check cable, port, speed, power and --station'
+_MOST_IN_VAIN = 5  # cases without a byte of a target that should answer; no further one is tried
 
 # With more, a run could not try the cases in the time that it has.
 _ANSWER_TIME = number_option('a number of seconds above 0, up to 30', math.ulp(0.0), 30.0)
@@ -200,6 +201,9 @@ def _judge(options: argparse.Namespace, target: Target, cases: Sequence[Case], w
             results.append(result)
             if not (options.json or options.report):
                 print(line_of(result), flush=True)
+            if isinstance(end, AskingEnd) and not wire.reader.has_heard and sum(
+                    each.verdict is Verdict.FAIL for each in results) == _MOST_IN_VAIN:
+                break
     finally:  # also of a run that Ctrl-C or the loss of the line ends
         _tell_results(options, results, identity, wire, network)
     if wire.noise:

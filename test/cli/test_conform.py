@@ -136,12 +136,21 @@ def test_echo_that_comes_byte_by_byte_is_not_an_answer(
     assert 'no byte was received' in capsys.readouterr().err
 
 
+def test_cases_end_early_if_nobody_answers_any_of_them(tmp_path: Path, capsys: Output) -> None:
+    dead = Pty(tmp_path / 'dead')
+    assert main(['slave', '--port', str(dead.name), '--answer-time', '0.02']) == 1
+    said = capsys.readouterr()
+    assert said.out.count('FAIL ') == 5 and '0 passed, 5 failed' in said.out
+    assert 'no byte was received' in said.err
+
+
 def test_nobody_there_is_said(tmp_path: Path, capsys: Output) -> None:
     dead = Pty(tmp_path / 'dead')
     assert main(['slave', '--port', str(dead.name), '--answer-time', '0.05', '--only',
                  'poll-idle', '--report']) == 1
     said = capsys.readouterr()
-    assert said.err == 'conform: no byte was received: check cable, port, speed and power\n'
+    assert said.err == (
+        'conform: no byte was received: check cable, port, speed, power and --station\n')
     assert '\n- processor: not known\n' in said.out
     dead.close()
 

@@ -287,7 +287,7 @@ def test_command_writes_a_map_once_and_says_how_to_go_on(
 
 
 @for_all(('text', 'expected'), [
-    ('a,b\n1,2\n', 'is none of these: tags of KEPServerEX '), ('', 'is none of these: '),
+    ('a,b\n1,2\n', 'is none of these: tags of KEPServerEX '), ('', 'the file is empty'),
     # What the columns of a list without a header mean is not guessed.
     ('N7:0,SPEED OF LINE,x\n', 'has addresses, but no first row with names: write one, such as '),
     ('N7:0,Global,SPEED\nN7:1,2,LEVEL\n', 'has addresses, but no first row with names'),

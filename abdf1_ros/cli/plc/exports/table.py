@@ -122,7 +122,8 @@ def table_of(sheet: Sheet, wanted: Wanted) -> Listing:
     if table := _symbols(sheet, wanted):
         return table
     raise ConfigurationError([Problem(
-        sheet.path, without_names(sheet) or f'is none of these: {_TITLES}')])
+        sheet.path, without_names(sheet) or (
+            f'is none of these: {_TITLES}' if sheet.records else 'the file is empty'))])
 
 
 def _headings(record: Record) -> list[str]:
