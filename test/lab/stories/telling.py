@@ -477,8 +477,9 @@ class Telling:
         """Demand that nothing is read at an end (5), but for a read that was under way then."""
         world = self.world
         when, _, command = world.commands[-1]
-        begun = max(world.ended, world.opened, self._ill_until) + STEP
-        if when > begun and not is_write(command) \
+        is_well = self._ill_until <= world.ended \
+            and not any(row.may_rewrite for row in world.rows.values())
+        if is_well and when > max(world.ended, world.opened) + STEP and not is_write(command) \
                 and not any(command.data == asked.data for asked in world.asked):
             raise Broken('Unread', f'{command} was sent at {when:.3f} (5)', world)
 
