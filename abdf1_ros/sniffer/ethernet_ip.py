@@ -35,6 +35,7 @@ from abdf1_ros.sniffer.capture import Chunk, Direction
 from abdf1_ros.sniffer.packet_files import RecordedPacket
 from abdf1_ros.sniffer.pcapng import DIRECTIONS, HEAD_SIZE, LINK_TYPE, VERSION
 from abdf1_ros.sniffer.serial_packets import DeviceServers, USB_HEADS, UsbDevices
+from abdf1_ros.sniffer.tcp import TcpWay
 
 # A serial port recorded by an RTAC of SEL (link type RTAC_SERIAL): 12 bytes before the data. The
 # ninth byte is the event; only the begin and the end of sending or receiving have data.
@@ -52,7 +53,6 @@ _LINKS = {0: (4, None), 1: (14, 12), 101: (0, None), 113: (16, 14), 276: (20, 0)
 _IP, _TCP = b'\x08\x00', 6
 _TAGS = b'\x81\x00', b'\x88\xA8'  # 802.1Q and 802.1ad
 _MOST_STREAMS = 1000
-_MOST_EARLY = 8  # segments that wait for an earlier segment
 
 _SENDS = EipCommand.SEND_RR_DATA, EipCommand.SEND_UNIT_DATA
 _PCCC_OBJECT = b'\x20\x67', b'\x21\x00\x67\x00'  # a path begins with its class
@@ -69,7 +69,7 @@ class _Stations(dict[bytes, int]):
 
 class _Stream:
     """
-    The bytes of one direction of a TCP connection, in their order.
+    The messages of one direction of a TCP connection, in their order.
 
     An early segment waits for the segments before it. A segment of whole messages does not wait,
     because its messages must come before their answers. ``asked`` has the TNS of its requests.
@@ -77,56 +77,43 @@ class _Stream:
 
     def __init__(self) -> None:
         self.asked: set[bytes] = set()
-        self._next: int | None = None
+        self._way = TcpWay()
+        self._end = 0  # number of the byte after the last part
         self._waiting = b''
-        self._early: dict[int, bytes] = {}
-        self._taken: dict[int, int] = {}  # sizes of whole messages that came early
+        self._taken: set[int] = set()  # segments of whole messages that came early
 
     def feed(self, number: int, data: bytes) -> Iterator[bytes]:
         """Take a segment; yield the data of the EtherNet/IP messages that it completes."""
-        known = -self._distance(number) & 0xFFFFFFFF
-        if known >= 1 << 31:  # a segment before it comes later, or was lost
-            yield from self._take_early(number, data)
-        elif not known or known < len(data):  # otherwise all its bytes came before
-            self._next = number & 0xFFFFFFFF if self._next is None else self._next
-            yield from self._take(data[known:])
-            yield from self._follow()
+        number &= 0xFFFFFFFF
+        if self._way.is_early(number) and number not in self._taken and (
+                messages := _whole(data)):
+            self._taken.add(number)
+            yield from messages
+        yield from self._take(self._way.feed(number, data))
 
     def flush(self) -> Iterator[bytes]:
         """Yield what is complete although bytes before it are missing."""
-        while early := {*self._early, *self._taken}:
-            self._waiting = b''
-            self._next = min(early, key=self._distance)
-            yield from self._follow()
+        while parts := [*self._way.flush()]:
+            yield from self._take(parts)
 
-    def _distance(self, number: int) -> int:
-        """Return how many bytes after the next byte a segment begins; its numbers wrap."""
-        return 0 if self._next is None else number - self._next & 0xFFFFFFFF
+    def _take(self, parts: Iterable[tuple[int, bytes]]) -> Iterator[bytes]:
+        for number, data in parts:
+            if number != self._end:
+                self._waiting = b''
+            self._end = number + len(data) & 0xFFFFFFFF
+            is_taken = number in self._taken
+            self._taken = {each for each in self._taken
+                           if each == self._end or self._way.is_early(each)}
+            if not is_taken:
+                messages, self._waiting = _messages(self._waiting + data)
+                yield from _sent(messages)
 
-    def _take_early(self, number: int, data: bytes) -> Iterator[bytes]:
-        messages = [*_sent(_messages(data)[0])]
-        if messages and sum(map(len, messages)) == len(data) - HEADER_SIZE * len(messages):
-            if number not in self._taken:
-                yield from messages
-            self._taken[number] = len(data)
-        elif data:
-            self._early[number] = data
-        if len(self._early) + len(self._taken) > _MOST_EARLY:
-            yield from self.flush()
 
-    def _follow(self) -> Iterator[bytes]:
-        while self._next is not None and (self._next in self._early or self._next in self._taken):
-            size = self._taken.pop(self._next, 0)
-            if size:
-                self._next = self._next + size & 0xFFFFFFFF
-            else:
-                yield from self._take(self._early.pop(self._next))
-
-    def _take(self, data: bytes) -> Iterator[bytes]:
-        assert self._next is not None
-        self._next = self._next + len(data) & 0xFFFFFFFF
-        messages, self._waiting = _messages(self._waiting + data)
-        yield from _sent(messages)
+def _whole(data: bytes) -> list[bytes]:
+    """Return the data of the messages of a segment; empty if it has more than whole messages."""
+    messages = [*_sent(_messages(data)[0])]
+    is_whole = sum(map(len, messages)) == len(data) - HEADER_SIZE * len(messages)
+    return messages if is_whole else []
 
 
 def _messages(data: bytes) -> tuple[list[bytes], bytes]:

@@ -23,15 +23,15 @@ whether it is one, so a recording without them is refused.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 import struct
 
 from abdf1_ros.sniffer.capture import Chunk, Direction
+from abdf1_ros.sniffer.tcp import TcpWay
 
 USB_HEADS = {189: 48, 220: 64}  # bytes before the data, by link type
 _MOST_WAYS = 1000
-_MOST_EARLY = 8  # segments that wait for an earlier segment
 
 _CONTROL, _BULK = 2, 3
 _GET_DESCRIPTOR = b'\x80\x06'
@@ -43,50 +43,12 @@ _STATUS_BYTES = 2
 _FAST, _FAST_SIZE, _SIZE = (0x0700, 0x0800, 0x0900), 512, 64
 
 
-class _Way:
-    """The bytes of one direction of a TCP connection, in their order."""
-
-    def __init__(self) -> None:
-        self._next: int | None = None
-        self._early: dict[int, bytes] = {}
-
-    def feed(self, number: int, data: bytes) -> bytes:
-        """Take a segment; return the bytes that follow those before."""
-        if not data:
-            return b''
-        self._next = number if self._next is None else self._next
-        if number not in self._early or len(data) > len(self._early[number]):
-            self._early[number] = data
-        return self._follow() or (self.flush() if len(self._early) > _MOST_EARLY else b'')
-
-    def flush(self) -> bytes:
-        """Return the bytes after those that were lost."""
-        if not self._early:
-            return b''
-        self._next = min(self._early, key=self._distance)
-        return self._follow()
-
-    def _distance(self, number: int) -> int:
-        """Return how many bytes after the next byte a segment begins; its numbers wrap."""
-        return number - (self._next or 0) & 0xFFFFFFFF
-
-    def _follow(self) -> bytes:
-        found = b''
-        while ready := [number for number, data in self._early.items()
-                        if -self._distance(number) & 0xFFFFFFFF < 1 << 31]:
-            number = ready[0]
-            data = self._early.pop(number)[-self._distance(number) & 0xFFFFFFFF:]
-            found += data
-            self._next = (self._next or 0) + len(data) & 0xFFFFFFFF
-        return found
-
-
 class DeviceServers:
     """The TCP connections of a device server at one of ``ports``, which is one line."""
 
     def __init__(self, ports: frozenset[int]) -> None:
         self._ports = ports
-        self._ways: defaultdict[bytes, _Way] = defaultdict(_Way)
+        self._ways: defaultdict[bytes, TcpWay] = defaultdict(TcpWay)
         self._server = b''
 
     def feed(self, ends: bytes, number: int, data: bytes, time: float | None, *,
@@ -96,12 +58,13 @@ class DeviceServers:
             yield from self.flush(time)
             self._ways.clear()
         if data:
-            yield from self._chunk(ends, self._ways[ends].feed(number & 0xFFFFFFFF, data), time)
+            parts = self._ways[ends].feed(number & 0xFFFFFFFF, data)
+            yield from self._chunk(ends, _joined(parts), time)
 
     def flush(self, time: float | None) -> Iterator[Chunk]:
         """Yield the bytes after those that were lost."""
         for ends, way in self._ways.items():
-            while data := way.flush():
+            while data := _joined(way.flush()):
                 yield from self._chunk(ends, data, time)
 
     def _chunk(self, ends: bytes, data: bytes, time: float | None) -> Iterator[Chunk]:
@@ -114,6 +77,10 @@ class DeviceServers:
             raise ValueError(f'device servers {_named(self._server)} and {_named(server)} are two '
                              'lines; keep the packets of one, or choose its port with --tcp')
         yield Chunk(time, Direction.OUT if is_to else Direction.IN, data)
+
+
+def _joined(parts: Iterable[tuple[int, bytes]]) -> bytes:
+    return b''.join(part for _, part in parts)
 
 
 def _named(server: bytes) -> str:

@@ -26,6 +26,7 @@ from abdf1_ros.cli.plc.session import opened
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Frame, Poll
 from abdf1_ros.df1.listener import LineKind, ListeningDecoder
+from abdf1_ros.diagnosis.traces import SURE
 from abdf1_ros.driver.overheard import Carried
 from abdf1_ros.errors import PortLost
 from abdf1_ros.ports.wake import Wake
@@ -40,10 +41,6 @@ LISTENED = 1.0
 
 LISTENED_ON = 6.0
 """Seconds to listen at a speed with one poll or message: more may come from a slow master."""
-
-# Number of polls and messages that show a master. One poll is not enough: after DLE ENQ, one of
-# 256 random byte pairs has a right BCC.
-_SURE = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +72,7 @@ def overhear(network: Network, bauds: Sequence[int],
     for baud in bauds:
         show(f'listening at {baud} baud')
         characters, named, check = _heard(replace(silent(network), baud=baud))
-        if named.total() >= _SURE:
+        if named.total() >= SURE:
             return ForeignMaster(baud, sorted(named), check)
         has_traffic |= characters > 0
         if not has_traffic:
@@ -126,7 +123,7 @@ def _heard(network: Network) -> tuple[int, Counter[int], Checksum | None]:
     decoder = ListeningDecoder(kind)
     characters, named = 0, Counter[int]()
     for _, data in _bytes_of(
-            network, lambda: LISTENED_ON if 0 < named.total() < _SURE else LISTENED):
+            network, lambda: LISTENED_ON if 0 < named.total() < SURE else LISTENED):
         characters += len(data)
         decoder.feed(data)
         while (symbol := decoder.next_symbol()) is not None:
