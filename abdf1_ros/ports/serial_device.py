@@ -137,7 +137,7 @@ def _opened(settings: PortSettings) -> serial.Serial:
     except (OSError, ValueError, termios.error) as error:  # termios.error: a device without parity
         if settings.parity != 'None' and is_pseudo_terminal(settings.name):
             raise OSError(errno.EINVAL, 'a pseudo-terminal has no parity: Parity None') from error
-        raise OSError(*_plain(error)) from error
+        raise OSError(*_plain(error)) from None  # three tracebacks would say no more
 
 
 def _plain(error: Exception) -> tuple[object, ...]:

@@ -26,6 +26,7 @@ import stat
 import struct
 import termios
 import time
+import traceback
 from types import SimpleNamespace
 from typing import Any
 
@@ -51,6 +52,7 @@ def test_port_that_cannot_be_opened(name: str, listens: bool, text: str) -> None
     with pytest.raises(OSError) as caught:  # noqa: PT011
         open_port(PortSettings(name, listens=listens))
     assert (caught.value.strerror or str(caught.value)) == text
+    assert 'SerialException' not in ''.join(traceback.format_exception(caught.value))
 
 
 def test_port_that_another_program_has_asked_the_system_to_keep(
