@@ -107,11 +107,14 @@ class Telling:
         self._counted_at = 0.0  # that heartbeats did, or need not
 
     def came(self) -> Iterator[str]:
-        """Return what PLCs have executed, and then all results."""
+        """Return what PLCs have executed, and then all results and refusals of own writes."""
         for entry in self.world.executed:
             yield f'{entry.tag} = {entry.value}{" late" * entry.is_late}'
         for result in self.world.results:
             yield f'{result.mapping.tag} {result.value}: {result}'
+        for place, reason in self.world.listener.reasons:
+            if reason.startswith('not written'):
+                yield f'{place} {reason}'
 
     def tell(self) -> None:
         """Let it all happen."""

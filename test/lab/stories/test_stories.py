@@ -24,6 +24,8 @@ from unittest import mock
 
 from abdf1_ros.driver.kernel.end import OrderlyEnd
 from abdf1_ros.driver.kernel.flights import Flights, Words
+from abdf1_ros.driver.kernel.heartbeat import HeartbeatRow
+from abdf1_ros.driver.kernel.rows import OwnRows
 import pytest
 from stories.scenes import Kind, kinds_of, SCENES, SMALL
 from stories.walk import Ledger, shortest, story_of, tell, text_of, Walk
@@ -110,7 +112,16 @@ def _always(value: object) -> Callable[..., object]:
     (OrderlyEnd, 'unconfirmed', _always([]), 'little end', 'write 2: kept 2\nat 0.95: end 0.3',
      'Named'),
     (Words, 'are_ours', lambda self, but=None: self.last is not None, 'little sts', '',
-     'Belief')])
+     'Belief'),
+    (Words, 'may_hold', _always(True), 'little run', 'at 0.9: foreign', 'Noticed'),
+    (OrderlyEnd, 'keeps_line', property(_always(False)), 'little last', 'write 3: no reply',
+     'Unread'),
+    (HeartbeatRow, 'again_at', property(_always(math.inf)), 'little zero', 'write 2: kept last',
+     'Beats'),
+    (OwnRows, 'is_overruled', _always(False), 'little race', 'at 0.53: slow 0.04', 'Named'),
+    (Words, '_is_settled', _always(True), 'little again via', 'at 0.05: before speed last',
+     'Stands'),
+    (HeartbeatRow, 'is_at_rest', property(_always(False)), 'little calls', '', 'Counts')])
 def test_story_shows_a_mistake(owner: type, name: str, made: Any, scene: str, story: str,
                                check: str) -> None:
     assert tell_broken(scene, story) == ''
