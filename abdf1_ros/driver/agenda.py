@@ -40,6 +40,7 @@ line time of probes.
 from __future__ import annotations
 
 from collections.abc import Container
+from dataclasses import dataclass
 import math
 from operator import attrgetter
 
@@ -48,7 +49,8 @@ from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.checks import Checks
 from abdf1_ros.driver.guests import GuestJob, GuestQueue
 from abdf1_ros.driver.job_tasks import Job, JobTasks
-from abdf1_ros.driver.kernel.kernel import Kernel, Rank
+from abdf1_ros.driver.kernel.gate import Rank
+from abdf1_ros.driver.kernel.kernel import Kernel
 from abdf1_ros.driver.reads.silent import Reads
 from abdf1_ros.driver.write import key_of
 from abdf1_ros.driver.writes.jobs import WriteJob, WritesUnderWay
@@ -110,6 +112,41 @@ class _GuestShare:
                 self.owed -= took
 
 
+@dataclass(slots=True)
+class _OwnShare:
+    """
+    Heartbeats and fallbacks that went in a row, without a read between them.
+
+    - ``last_read``: the station of the last read between own writes.
+    - ``was_vain``: the station of the last own write is silent, or its row is odd.
+    """
+
+    in_a_row: int = 0
+    last_read: int | None = None
+    was_vain: bool = False
+
+
+@dataclass(slots=True)
+class _Questions:
+    """
+    The jobs that ask on a connection that has not been heard.
+
+    ``next`` is when another one may be asked after the quick ones (clock value in s).
+    """
+
+    asked: int = 0
+    next: float = -math.inf  # noqa: A003
+
+    @property
+    def are_slow(self) -> bool:
+        """Tell whether the quick questions are over."""
+        return self.asked >= _QUICK_QUESTIONS
+
+    def ask(self, now: float) -> None:
+        """Record a question."""
+        self.asked, self.next = self.asked + 1, now + QUESTION_PERIOD
+
+
 class Agenda:
     """
     Decide which job has the line next: one of a queue, or one under way.
@@ -121,7 +158,6 @@ class Agenda:
                  checks: Checks, reads: Reads, guests: GuestQueue, tasks: JobTasks) -> None:
         self._stations = stations
         self._kernel, self._writing = kernel, writing
-        self._turns, self._end = kernel.turns, kernel.end
         self._has_own = bool(kernel.rows.plc_of)
         self._messages = kernel.waiting.writes
         self._checks = checks
@@ -130,11 +166,8 @@ class Agenda:
         self._share = _GuestShare(stations, guests, tasks)
         self._held_until = math.inf  # when a waiting guest may have the line (clock value in s)
         self._tasks = tasks
-        self._own_in_a_row = 0
-        self._last_read: int | None = None  # the station of the last read between own writes
-        self._was_vain = False  # the last own write: its station is silent, or the row is odd
-        self._questions = 0  # on a connection that has not been heard
-        self._next_question = -math.inf  # after the quick questions (clock value in s)
+        self._own = _OwnShare()
+        self._questions = _Questions()
         self._writes_in_a_row = 0
         self._has_begun_write = False
         self._last_check = -math.inf
@@ -148,7 +181,7 @@ class Agenda:
         if not self._tasks.is_heard:
             job = self._unheard(now, busy)
         else:
-            self._questions = 0
+            self._questions.asked = 0
             job = self._own_first(now, busy) if self._has_own else self._usual(now, busy)
         if job is None or job in self._tasks.under_way:
             return job
@@ -168,10 +201,9 @@ class Agenda:
         """
         if not any(self._stations) and (write := self._write(now, busy)):
             return write
-        is_limited = self._questions >= _QUICK_QUESTIONS and now < self._next_question
-        if is_limited:
+        if self._questions.are_slow and now < self._questions.next:
             guests = self._guests
-            self._held_until = self._next_question \
+            self._held_until = self._questions.next \
                 if guests.inbox.items or guests.waiting else math.inf
             return self._has_own and (
                 self._tasks.continued(now, busy, _is_own)  # with all its packets
@@ -179,39 +211,38 @@ class Agenda:
                 or self._begin(Rank.REFRESH, now, busy)) or None
         job = self._own_first(now, busy) if self._has_own else self._usual(now, busy)
         if job is not None:
-            self._questions += 1
-            self._next_question = now + QUESTION_PERIOD
+            self._questions.ask(now)
         return job
 
     def _own_first(self, now: float, busy: Container[int]) -> Job | None:
         """Return the next job: own writes first, not counted as ``writes`` in a row (rule 11)."""
-        if self._end.is_asked:  # no read has a turn now (rule 5)
-            self._own_in_a_row, self._was_vain = 0, False
-        if self._own_in_a_row >= OWN_IN_A_ROW and not self._turns.is_beats_turn(now):
-            if busy and self._last_read is not None and self._last_read not in busy:
+        if self._kernel.end.is_asked:  # no read has a turn now (rule 5)
+            self._own.in_a_row, self._own.was_vain = 0, False
+        if self._own.in_a_row >= OWN_IN_A_ROW and not self._kernel.turns.is_beats_turn(now):
+            if busy and self._own.last_read is not None and self._own.last_read not in busy:
                 # Stations take turns: with eight, the read might be for the same one each time.
-                self._last_read = None
+                self._own.last_read = None
             elif job := self._check_or_read(now, busy):
-                self._own_in_a_row, self._last_read = 0, job.station
-                self._turns.beats_gave_way()
+                self._own.in_a_row, self._own.last_read = 0, job.station
+                self._kernel.turns.beats_gave_way()
                 return job
         # Remaining packets of a long fallback go first: heartbeats that are always due would keep
         # them waiting. Where the fallback stands, heartbeats count and must not wait for it.
         # A packet to a silent station takes a whole Timeout, and so does a packet of an odd row.
         # So a write to a station that answers goes between.
-        own: Job | None = self._was_vain and self._begin(Rank.ACTIVE, now, busy) or None
+        own: Job | None = self._own.was_vain and self._begin(Rank.ACTIVE, now, busy) or None
         own = own or self._tasks.continued(now, busy, self._is_urgent)
-        if own is None and self._was_vain:  # after all packets of such a try
-            self._was_vain = False
+        if own is None and self._own.was_vain:  # after all packets of such a try
+            self._own.was_vain = False
             if job := self._check_or_read(now, busy):
                 return job
         own = own or self._begin(Rank.OWN, now, busy)
         own = own or self._tasks.continued(now, busy, self._is_awaited)
         if own is None:
             return self._usual(now, busy)
-        self._own_in_a_row += 1
-        self._was_vain = not self._stations[own.station].active or self._stations.odd.is_suspect(
-            own.key, own.station)
+        self._own.in_a_row += 1
+        is_suspect = self._stations.odd.is_suspect(own.key, own.station)
+        self._own.was_vain = not self._stations[own.station].active or is_suspect
         return own
 
     def _begin(self, rank: Rank, now: float, busy: Container[int]) -> WriteJob | None:
@@ -220,10 +251,10 @@ class Agenda:
         return WriteJob(turn, self._writing) if turn is not None else None
 
     def _is_urgent(self, job: Job) -> bool:
-        return isinstance(job, WriteJob) and self._turns.is_urgent(job.flight)
+        return isinstance(job, WriteJob) and self._kernel.turns.is_urgent(job.flight)
 
     def _is_awaited(self, job: Job) -> bool:
-        return isinstance(job, WriteJob) and self._turns.is_awaited(
+        return isinstance(job, WriteJob) and self._kernel.turns.is_awaited(
             job.flight, self._tasks.line.now)
 
     def _check_or_read(self, now: float, busy: Container[int]) -> Job | None:
@@ -239,13 +270,13 @@ class Agenda:
             return write
         guests = self._guests
         # At the end a guest could overwrite a fallback that is confirmed already.
-        has_guests = (guests.inbox.items or guests.waiting) and not self._end.is_asked
+        has_guests = (guests.inbox.items or guests.waiting) and not self._kernel.end.is_asked
         is_held = has_guests and now < self._share.begins
         self._held_until = self._share.begins if is_held else math.inf
         has_guests = has_guests and not is_held
         if has_guests and self._share.is_turn and (guest := self._guest(now, busy)):
             return guest
-        if self._has_own and self._end.keeps_line:
+        if self._has_own and self._kernel.end.keeps_line:
             self._is_reads_turn = False
             return self._refresh(now, busy) or has_writes and self._write(now, busy) or None
         if self._stations.probes.died_at > -math.inf and (late := self._after_death(now, busy)):
@@ -360,14 +391,14 @@ class Agenda:
             if self._last_odd_was_check:
                 self._last_odd_was_check = not self._stations.odd.is_odd(job.key)
             self._is_reads_turn = False
-            self._writes_in_a_row = self._own_in_a_row = 0
+            self._writes_in_a_row = self._own.in_a_row = 0
         return job
 
     def next_due(self) -> float:
         """Return when the next job is due (clock value in s), infinite for never."""
-        if self._has_own and self._end.keeps_line:
-            return self._turns.next_due()
+        if self._has_own and self._kernel.end.keeps_line:
+            return self._kernel.turns.next_due()
         due = min(self._reads.next_due(), self._checks.next_due, self._held_until)
-        if not self._tasks.is_heard and self._questions >= _QUICK_QUESTIONS:
-            due = max(due, self._next_question)
-        return min(due, self._turns.next_due()) if self._has_own else due
+        if not self._tasks.is_heard and self._questions.are_slow:
+            due = max(due, self._questions.next)
+        return min(due, self._kernel.turns.next_due()) if self._has_own else due

@@ -106,6 +106,13 @@ def _routes(network: Network, mappings: Iterable[Mapping]) -> dict[int, int]:
             if mapping.via is not None and network.line_mode.is_master}
 
 
+def _options(settings: DriverSettings, network: Network, mappings: Rows) -> LinkOptions:
+    """Return the options of the link: a DLE NAK of ours destroys nothing that others miss."""
+    is_open = settings.nak_on_command_timeout is None
+    return replace(settings, nak_on_command_timeout=False) \
+        if is_open and lost_by_reset(network, mappings) else settings
+
+
 class Driver:
     """Read and write the mapped addresses over one line, and serve the words of our own table."""
 
@@ -125,40 +132,37 @@ class Driver:
         are_behind = network.line_mode.has_one_plc and len(self.mappings.stations) > 1
         for row in self.mappings.of_plcs:
             self.stations[row.station].has_gateway |= are_behind or row.via is not None
-        self.is_online = False
         self._settings = settings
         self._listener = listener
         self._inbox: Inbox[Write] = Inbox(is_open=False)
         self._make_queues()
         self.link = network.line_mode.make_link(
-            self.machine, network.link(self._options()), self.stations, self.serve,
-            listener.happened)
+            self.machine, network.link(_options(settings, network, self.mappings)),
+            self.stations, self.serve, listener.happened)
         self.overheard: Overheard | None = None
         if isinstance(self.machine, ListeningMachine):
             self.overheard = self.machine.listener = Overheard(
                 network, self.mappings, self.readings, self.stations, self.checks, self.tasks)
 
-    def _options(self) -> LinkOptions:
-        """Return the options of the link: a DLE NAK of ours destroys nothing that others miss."""
-        is_open = self._settings.nak_on_command_timeout is None
-        return replace(self._settings, nak_on_command_timeout=False) \
-            if is_open and lost_by_reset(self.network, self.mappings) else self._settings
+    @property
+    def is_online(self) -> bool:
+        """Tell whether the port is open, so that messages are taken."""
+        return self._inbox.is_open
 
     def _make_queues(self) -> None:
         """Make the queues of jobs, and the agenda that decides between them."""
         network, settings, machine = self.network, self._settings, self.machine
+        own = Rows() if settings.read_only else self.mappings
+        active = self.mappings.without(self.mappings.own) if settings.read_only else self.mappings
         self.tasks = JobTasks(network.station, settings.first_tns, machine, self.stations.odd)
         self.served = self._make_served()
         self.kernel = Kernel(
-            self.mappings, Rows() if settings.read_only else self.mappings, self.stations, machine,
-            self.tasks, self.served, settle_time=2 * network.cmd_timeout / 1000,
-            patience=settings.write_timeout, tx_delay=network.timing.tx_delay,
-            seed=settings.first_tns)
+            self.mappings, own, self.stations, machine, self.tasks, self.served,
+            settle_time=2 * network.cmd_timeout / 1000, patience=settings.write_timeout,
+            tx_delay=network.timing.tx_delay, seed=settings.first_tns)
         self.readings = Readings(
-            network, self._active_rows(), settings, self.stations, machine, self._listener,
-            self.kernel)
+            network, active, settings, self.stations, machine, self._listener, self.kernel)
         self.points = self.readings.points
-        self._demands = self.readings.demands
         self.refused = RefusedCommands(PlcType(network.plc_type))
         writing = WritesUnderWay(self.stations, machine, self.kernel, self.readings)
         self.spent = writing.spent
@@ -226,7 +230,7 @@ class Driver:
             answer(ReadAnswer(error=f'Mode {self.network.mode}: nothing is sent'))
         elif self.kernel.end.is_asked:
             answer(ReadAnswer(error=ENDS))
-        elif not self._demands.inbox.put(ReadCall(mapping, answer)):
+        elif not self.readings.demands.inbox.put(ReadCall(mapping, answer)):
             answer(ReadAnswer(error=_NOT_OPEN))
 
     def refuse(self, mappings: Iterable[Mapping], reason: str,
@@ -235,11 +239,6 @@ class Driver:
         for mapping in mappings:
             self._listener.written(
                 WriteResult(mapping, Outcome.REFUSED, reason, show(values), request=request))
-
-    def _active_rows(self) -> Rows:
-        """Return the rows that mean work on the line."""
-        return self.mappings.without(self.mappings.own) if self._settings.read_only \
-            else self.mappings
 
     def _make_served(self) -> Served:
         plc_type, mode = PlcType(self.network.plc_type), self.network.mode
@@ -255,7 +254,7 @@ class Driver:
         """Return the command that has the line next, not for a ``busy`` station."""
         if self._inbox.items:
             self._sort_inbox(now)  # the machine has expired jobs that have waited too long
-        if self._demands.inbox.items:
+        if self.readings.demands.inbox.items:
             self.readings.take_demands(now)
         if self.checks.requests.items:
             self.checks.take_requests(now)
@@ -275,8 +274,8 @@ class Driver:
         self.kernel.expire(now)
         self.tasks.expire(now)
         self.guests.expire(now)
-        if now >= self._demands.next_expiry:
-            self._demands.expire(now)
+        if now >= self.readings.demands.next_expiry:
+            self.readings.demands.expire(now)
         self._take_news()
 
     def next_expiry(self) -> float:
@@ -284,7 +283,7 @@ class Driver:
         if self.kernel.out:
             return self.machine.now
         return min(self.kernel.next_expiry, self.tasks.next_expiry, self.guests.next_expiry,
-                   self._demands.next_expiry)
+                   self.readings.demands.next_expiry)
 
     def _take_news(self) -> None:
         """Hand on what has come of the events of the kernel."""
@@ -368,22 +367,21 @@ class Driver:
         self.checks.begin(self.machine.now)
         self.kernel.opened(self.machine.now)
         self._inbox.open()
-        self._demands.inbox.open()
+        self.readings.demands.inbox.open()
         self.guests.begin()
-        self.is_online = True
         return self.link.run(self)
 
     def ended(self, error: Exception | None) -> None:
         """Give every job a result, so that no old command is sent later: the port is gone."""
         if not isinstance(error, PortLost):
             error = PortLost(INTERNAL_ERROR)
-        self.is_online = False
+        messages = [*self._inbox.close()]
         self.tasks.fail(error)
         self._agenda.port_lost(self.machine.now)
         self.guests.end()
         self.checks.end(str(error))
         self.readings.port_lost(str(error))
-        self.kernel.lost(self._inbox.close(), str(error), self.machine.now)
+        self.kernel.lost(messages, str(error), self.machine.now)
         self._take_news()
 
     def _station_told(self, station: int, identity: Identity | None, asked: float) -> None:

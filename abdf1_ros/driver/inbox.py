@@ -27,14 +27,14 @@ class Inbox(Generic[_Item]):
     """
     Hand items from any threads to one thread that takes them, in their order, each once.
 
-    ``items`` are the items that wait. A closed inbox accepts no item. There is no lock: every step
-    is one atomic operation of a deque. The items are never copied and then cleared: an item that
-    another thread adds in between would be lost.
+    ``items`` are the items that wait. Unless it ``is_open``, an inbox accepts no item. There is no
+    lock: every step is one atomic operation of a deque. The items are never copied and then
+    cleared: an item that another thread adds in between would be lost.
     """
 
     def __init__(self, is_open: bool = True) -> None:
         self.items: deque[_Item] = deque()
-        self._is_open = is_open
+        self.is_open = is_open
 
     def __len__(self) -> int:
         """Return how many items wait."""
@@ -42,17 +42,17 @@ class Inbox(Generic[_Item]):
 
     def open(self) -> None:  # noqa: A003
         """Accept items from now on."""
-        self._is_open = True
+        self.is_open = True
 
     def close(self) -> Iterator[_Item]:
         """Accept no more items; return the items that wait."""
-        self._is_open = False
+        self.is_open = False
         return self.take()
 
     def put(self, item: _Item) -> bool:
         """Add an item and return True; return False, without the item, if the inbox is closed."""
         self.items.append(item)
-        if self._is_open:
+        if self.is_open:
             return True
         # The inbox was closed before, or just now. In the second case the closing thread may have
         # taken the item.

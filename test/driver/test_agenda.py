@@ -21,7 +21,7 @@ import math
 
 from abdf1_ros.driver.agenda import MAX_WRITES_IN_A_ROW, QUESTION_PERIOD
 from abdf1_ros.driver.job_tasks import Job
-from abdf1_ros.driver.kernel.kernel import Rank
+from abdf1_ros.driver.kernel.gate import Rank
 from abdf1_ros.driver.reads.job import ReadJob
 from abdf1_ros.driver.write import Outcome, Write
 from abdf1_ros.pccc.dialect import Steps

@@ -22,6 +22,7 @@ import threading
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave
+from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.kernel.waiting import MAX_WAITING_WRITES
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome
@@ -87,11 +88,12 @@ def test_message_for_several_rows_waits_as_a_whole_or_not_at_all() -> None:
         'not written: refused: too many writes are waiting'] * 3
 
 
-def test_write_that_comes_just_when_the_port_is_lost_is_refused() -> None:
+def test_write_that_comes_just_when_the_port_is_lost_is_refused(
+        monkeypatch: pytest.MonkeyPatch) -> None:
     row = make_mapping('N7:0', 'Write')
     bench, _ = bench_of(row)
     bench.lose_port()
-    bench.driver.is_online = True  # as another thread saw it a moment ago
+    monkeypatch.setattr(Driver, 'is_online', True)  # as another thread saw it a moment ago
     bench.driver.write([row], [1], bench.clock(), 'r7')
     assert [(str(result), result.request) for result in bench.listener.results] == [
         ('not written: refused: the port is not open', 'r7')]

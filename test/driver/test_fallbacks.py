@@ -24,7 +24,7 @@ from abdf1_ros.df1.slave import HalfDuplexSlave
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.kernel.fallback import FallbackCause, FallbackRow, FallbackState
 from abdf1_ros.driver.kernel.flights import Flight, Flights, Words
-from abdf1_ros.driver.kernel.kernel import Rank
+from abdf1_ros.driver.kernel.gate import Rank
 from abdf1_ros.driver.kernel.own import Conditions
 from abdf1_ros.driver.kernel.plc import Plc
 from abdf1_ros.driver.kernel.waiting import WaitingWrites

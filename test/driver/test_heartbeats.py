@@ -22,8 +22,8 @@ import gc
 from random import Random
 
 from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.driver.kernel.gate import Rank
 from abdf1_ros.driver.kernel.heartbeat import BeatState, LARGEST, OtherWriter
-from abdf1_ros.driver.kernel.kernel import Rank
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome, Write
 from abdf1_ros.pccc.data_table import DataTable

@@ -18,7 +18,8 @@ from dataclasses import replace
 import math
 
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.driver.kernel.kernel import Kernel, Rank
+from abdf1_ros.driver.kernel.gate import Rank
+from abdf1_ros.driver.kernel.kernel import Kernel
 from abdf1_ros.driver.write import Write
 from abdf1_ros.driver.writes.jobs import WriteJob
 from abdf1_ros.settings.heartbeats import Fallback, LAST_ANSWER

@@ -192,7 +192,7 @@ class Desk:
         self.observer = observer
         mappings = [make_mapping('N7:0', 'Write', station=station) for station in (1, 2)]
         self.driver = Driver(Network(), mappings, DriverSettings(), Recorder(time.monotonic))
-        self.driver.is_online = True
+        self.driver._inbox.open()  # noqa: SLF001
         self.driver.checks.begin(0.0)
         self.woken: list[str] = []
         self.service = LinkCounterService(self.driver, lambda: self.woken.append('link'),

@@ -29,7 +29,8 @@ from abdf1_ros.driver.guest_rules import GuestRules
 from abdf1_ros.driver.guests import GuestQueue
 from abdf1_ros.driver.job_tasks import JobTasks
 from abdf1_ros.driver.kernel.flights import Flight, Flights
-from abdf1_ros.driver.kernel.kernel import Kernel, Rank, Turn
+from abdf1_ros.driver.kernel.gate import Rank, Turn
+from abdf1_ros.driver.kernel.kernel import Kernel
 from abdf1_ros.driver.reads.job import ReadJob
 from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.driver.reads.readings import Readings

@@ -15,7 +15,8 @@
 """
 The decision what may be written to the PLCs of a line (docs/heartbeats.md).
 
-``kernel`` takes the events and is the only gate to the line. The other modules answer questions:
+``kernel`` takes the events; ``gate`` is the only way to the line. The other modules answer
+questions:
 
 - ``flights``: each write from its turn on: what may still land, and what stands.
 - ``waiting``: the messages that wait for the line; ``reasons``: why a message is not taken.

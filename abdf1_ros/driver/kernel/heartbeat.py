@@ -125,12 +125,6 @@ class HeartbeatRow(SelfWritten):
         return int(write.raw[0]) if write is not None else 0
 
     @property
-    def confirmed(self) -> float | None:
-        """Return when the last reply confirmed a value, None before the first."""
-        last = self.words.last
-        return last.done if last is not None else None
-
-    @property
     def state(self) -> BeatState:
         """Return what the PLC is to see."""
         if self.is_taken:
@@ -265,8 +259,8 @@ class HeartbeatRow(SelfWritten):
     @property
     def _seen_at(self) -> float:
         """Return when the PLC has seen the 0 that stands for long enough (rule 2)."""
-        last = self.words.last
-        return (last.done if last is not None else math.inf) \
+        confirmed = self.confirmed
+        return (math.inf if confirmed is None else confirmed) \
             + max(self._period, _LEAST_ZERO) + self._other.extra_zero
 
     def hold(self, now: float) -> None:

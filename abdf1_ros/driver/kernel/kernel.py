@@ -25,25 +25,21 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from enum import auto, Enum
-import math
 from typing import Protocol
 
-from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import LineTime
-from abdf1_ros.driver.kernel.fallback import FallbackRow
 from abdf1_ros.driver.kernel.flights import Flight, Flights
+from abdf1_ros.driver.kernel.gate import Gate, Rank, Turn
 from abdf1_ros.driver.kernel.own import Crowd
 from abdf1_ros.driver.kernel.reasons import WriteReasons
 from abdf1_ros.driver.kernel.rows import OwnRows
-from abdf1_ros.driver.kernel.turns import DueRow, OwnTurns
+from abdf1_ros.driver.kernel.turns import OwnTurns
 from abdf1_ros.driver.kernel.waiting import WaitingWrites
 from abdf1_ros.driver.write import Outcome, Write, WriteResult
 from abdf1_ros.errors import LinkError, RemoteError
 from abdf1_ros.pccc.extent import Extent, OUR_TABLE
 from abdf1_ros.plan.planner import Block
-from abdf1_ros.settings.heartbeats import LAST_ANSWER
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.rows import Rows
 
@@ -62,45 +58,6 @@ class OurTable(Protocol):
     def store(self, mapping: Mapping, values: Sequence[float] | str) -> None: ...
 
     def clear(self) -> None: ...
-
-
-class Rank(Enum):
-    """
-    Which writes are asked for; the agenda has the order between them.
-
-    - ``OWN``: heartbeats and fallbacks that are due; ``ACTIVE``: the same, but only of PLCs that
-      answer.
-    - ``MESSAGE``: messages.
-    - ``REFRESH``: fallbacks that stand, to be written again (rule 8).
-    """
-
-    OWN = auto()
-    ACTIVE = auto()
-    MESSAGE = auto()
-    REFRESH = auto()
-
-
-@dataclass(frozen=True, slots=True)
-class Turn:
-    """
-    A write that has the line from now on.
-
-    - ``expires``, ``patience``, ``latest``, ``answer_within``: see ``job_tasks.Job``.
-    - ``is_free``: its time at a silent station does not count as time of probes.
-    """
-
-    flight: Flight
-    expires: float = math.inf
-    patience: float = 0.0
-    latest: float = math.inf
-    answer_within: float = math.inf
-    is_free: bool = False
-
-    @property
-    def write(self) -> Write:
-        """Return what is written."""
-        assert self.flight.write is not None
-        return self.flight.write
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,6 +110,7 @@ class Kernel:
         self.waiting = WaitingWrites(stations, self.flights, patience, self.out.append, tx_delay)
         self.rows = OwnRows(own, self.flights, stations, seed)
         self.turns = OwnTurns(self.rows, self.waiting)
+        self._gate = Gate(stations, self.flights, self.waiting, self.rows, self.turns)
         self.end = self.rows.end
         self._stations, self._line = stations, line
         self._connection, self._table = connection, table
@@ -322,80 +280,10 @@ class Kernel:
     def next(self, now: float, rank: Rank, busy: Container[int] = ()) -> Turn | None:  # noqa: A003
         """Return the next write of a rank, which begins now; not for a ``busy`` station."""
         if rank is Rank.MESSAGE:
-            return self._next_message(now, busy)
-        if rank is Rank.REFRESH:
-            due = self.turns.refresh(now, busy)
-            return due and self._begin_again(due, now)
-        self._expire_own(now)
-        only_active = rank is Rank.ACTIVE
-        if not self.end.has_begun:
-            due = self.turns.first(now, busy, only_active=only_active)
-            return due and self._begin(due, now)
-        only_active |= self.end.waits_for_active
-        self._stations.probes.keep_none_waiting(now)
-        if due := self.turns.first(now, busy, only_active=only_active):
-            return self._begin(due, now)
-        due = self.turns.once_more(busy, only_active=only_active)
-        return due and self._begin_at_end(due, now)
-
-    def _begin(self, due: DueRow, now: float) -> Turn:
-        """Begin the write of a 0, a number or a fallback that is due."""
-        plc, row, expires, conditions = due.plc, due.row, math.inf, self.rows.conditions
-        is_again = False
-        if isinstance(row, FallbackRow):
-            self.drop('fallback', now, row.mapping)
-            if is_again := row.stands:
-                conditions.gave_way = now
-        elif not row.wants_zero:
-            expires = plc.good_until(row, due.youngest)
-        conditions.is_beats_turn = is_again
-        is_free = row.is_first_try
-        row.trial = self._flight(row.take(now))
-        plc.begins(row)
-        return Turn(row.trial, expires, answer_within=self._answer_within(due), is_free=is_free)
-
-    def _begin_again(self, due: DueRow, now: float) -> Turn:
-        """Begin the write of a fallback that stands (rule 8)."""
-        due.row.trial = self._flight(due.row.refresh(now))
-        due.plc.begins(due.row)
-        return Turn(due.row.trial)
-
-    def _begin_at_end(self, due: DueRow, now: float) -> Turn:
-        """Begin the write of a row that stood when the end began (rule 5)."""
-        due.row.repeat = self._flight(due.row.refresh(now))
-        return Turn(due.row.repeat, answer_within=self._answer_within(due))
-
-    def _answer_within(self, due: DueRow) -> float:
-        """Return for how long (s) at most to wait for an answer: not for long at the end."""
-        is_last = self.end.has_begun and not due.plc.is_active
-        return LAST_ANSWER if is_last else math.inf
-
-    def _next_message(self, now: float, busy: Container[int]) -> Turn | None:
-        self._expire_messages(now)
-        while (write := self.waiting.first(busy)) is not None:
-            if proof := self._proof(write, now):
-                self.rows.stands(write)
-                self.waiting.end(write, Outcome.STANDS, f'{proof}; not written again', now)
-            elif self.waiting.gives_way(write, now):
-                self.waiting.end(write, Outcome.SUPERSEDED, '', now)
-            else:
-                self.waiting.begins(write, now)
-                first, all_of_it = self.waiting.good_within(write.mapping)
-                return Turn(self._flight(write), write.requested + first, first,
-                            write.requested + all_of_it)
-        return None
-
-    def _proof(self, write: Write, now: float) -> str:
-        """Return the proof that a message need not be written, empty for no proof (rule 27)."""
-        if not write.mapping.write_again or not self.rows.may_stand(write):
-            return ''
-        return self.flights.proof(write, now)
-
-    def _flight(self, write: Write) -> Flight:
-        """Begin a write to a PLC."""
-        station = write.mapping.station
-        write.is_probe = station != BROADCAST and not self._stations[station].replies_in_time
-        return self.flights.begin(station, (write.mapping.extent,), write)
+            self._expire_messages(now)
+        elif rank is not Rank.REFRESH:
+            self._expire_own(now)
+        return self._gate.next(now, rank, busy)
 
     def _tell(self, write: Write, outcome: Outcome, detail: str = '') -> None:
         self.out.extend(write.result(outcome, detail).of(write.origins, self._line.now))

@@ -118,6 +118,12 @@ class SelfWritten:
         return latest.begun if latest is not None else -math.inf
 
     @property
+    def confirmed(self) -> float | None:
+        """Return when the last reply confirmed a value of the row, None before the first."""
+        last = self.words.last
+        return last.done if last is not None else None
+
+    @property
     def has_confirmed(self) -> bool:
         """Tell whether the last write of the row was confirmed."""
         return self.trial is not None and self.trial.outcome is Outcome.WRITTEN

@@ -125,10 +125,6 @@ class Readings:
         """Return the blocks that are read again and again."""
         return [job.block for job in self.reads.jobs if not job.is_on_demand]
 
-    def are_read(self, row: Mapping) -> bool:
-        """Tell whether one of the blocks has all words of a row."""
-        return any(block.extent.holds(row.extent) for block in self.blocks)
-
     def _job(self, block: Block) -> ReadJob:
         mode, line = self._network.line_mode, self._network.line
         scan = mode.undisturbed(line, self._longest_frames, USUAL_RESPONSE_TIME,

@@ -37,6 +37,32 @@ from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.driver.reads.queue import ReadQueue
 
 
+class _Trust:
+    """How far a read can be expected to pass, by what has failed before (rule 29)."""
+
+    def __init__(self, stations: ActiveStationList) -> None:
+        self._stations = stations
+
+    def is_usual(self, job: ReadJob) -> bool:
+        """Tell whether a read that is due may be sent as usual."""
+        return self._stations.records[job.station].replies_in_time and (
+            job.is_unfinished or not self.failures(job) and not self._is_untested(job))
+
+    def _is_untested(self, job: ReadJob) -> bool:
+        """Tell whether a read has not passed since others of its station have begun to fail."""
+        return not job.is_on_demand and (
+            job.passed < self._stations.odd.since(job.station) < math.inf)
+
+    def failures(self, job: ReadJob) -> int:
+        """Return how often a read has failed in a row while its station replied to others."""
+        return self._stations.odd.failures(job.key)
+
+    def order(self, job: ReadJob) -> tuple[int, float, int]:
+        """Return the place of a read among those that are kept back; the least goes first."""
+        rank = self._stations.odd.rank(job.key)
+        return (rank, 0.0, 0) if rank else (rank, -job.passed, job.block.words)
+
+
 class Reads:
     """
     Keep all read jobs; ``stations.probes`` decides when a silent station may be read.
@@ -49,6 +75,7 @@ class Reads:
 
     def __init__(self, stations: ActiveStationList) -> None:
         self._stations = stations
+        self._trust = _Trust(stations)
         self.queue = ReadQueue()
         self.aside: dict[int, deque[ReadJob]] = {}
         self.kept_back: deque[ReadJob] = deque()
@@ -120,7 +147,7 @@ class Reads:
             return job
         passed_over, failed = [], self._stations.odd.failed
         while (job := self.queue.take(now)) is not None:
-            is_usual = self._is_usual(job) if failed \
+            is_usual = self._trust.is_usual(job) if failed \
                 else self._stations.records[job.station].replies_in_time
             if is_usual and job.station not in busy:
                 break
@@ -146,7 +173,7 @@ class Reads:
         passed_over, is_kept_waiting = [], False
         while (job := self.queue.take(due)) is not None:
             station = self._stations.records[job.station]
-            is_proven = station.replies > 0 and self._is_usual(job)
+            is_proven = station.replies > 0 and self._trust.is_usual(job)
             if is_proven and job.station not in busy:
                 job.is_probe = job.is_untested = False
                 break
@@ -169,7 +196,7 @@ class Reads:
         if station is None:
             return None
         jobs = self.aside.pop(station)
-        job = self._instead_of(min(jobs, key=self._order), now)
+        job = self._instead_of(min(jobs, key=self._trust.order), now)
         if job in jobs:
             jobs.remove(job)
         job.due, job.is_probe, job.is_untested = now, True, False
@@ -190,36 +217,18 @@ class Reads:
             if not self._stations.records[job.station].replies_in_time:
                 self.kept_back.remove(job)
                 self._set_aside(job)
-            elif self._is_usual(job) or job not in self.queue.jobs:
+            elif self._trust.is_usual(job) or job not in self.queue.jobs:
                 self.kept_back.remove(job)
                 self.queue.put(job, job.due)
         may_go = [job for job in self.kept_back if job.station not in busy and (
             now >= odd.next(job.key) or is_free and not odd.is_odd(job.key))]
         if not may_go:
             return None
-        job = self._instead_of(min(may_go, key=self._order), now)
+        job = self._instead_of(min(may_go, key=self._trust.order), now)
         if job in self.kept_back:
             self.kept_back.remove(job)
-        job.is_probe, job.is_untested = False, not self._failures(job)
+        job.is_probe, job.is_untested = False, not self._trust.failures(job)
         return job
-
-    def _is_usual(self, job: ReadJob) -> bool:
-        """Tell whether a read that is due may be sent as usual."""
-        return self._stations.records[job.station].replies_in_time and (
-            job.is_unfinished or not self._failures(job) and not self._is_untested(job))
-
-    def _is_untested(self, job: ReadJob) -> bool:
-        """Tell whether a read has not passed since others of its station have begun to fail."""
-        return not job.is_on_demand and (
-            job.passed < self._stations.odd.since(job.station) < math.inf)
-
-    def _failures(self, job: ReadJob) -> int:
-        return self._stations.odd.failures(job.key)
-
-    def _order(self, job: ReadJob) -> tuple[int, float, int]:
-        """Return the place of a read among those that are kept back; the least goes first."""
-        rank = self._stations.odd.rank(job.key)
-        return (rank, 0.0, 0) if rank else (rank, -job.passed, job.block.words)
 
     def _instead_of(self, job: ReadJob, now: float) -> ReadJob:
         """
@@ -231,10 +240,10 @@ class Reads:
         if not self._stations.odd.is_doubtful(job.station):
             return job
         others = [other for other in (*self.queue.waiting(), *self.kept_back)
-                  if other.station == job.station and not self._failures(other)]
+                  if other.station == job.station and not self._trust.failures(other)]
         if not others:
             return job
-        other = min(others, key=self._order)
+        other = min(others, key=self._trust.order)
         if other not in self.kept_back:
             self.queue.take_early(other, now)
         return other
@@ -249,12 +258,12 @@ class Reads:
     def find_due(self, now: float) -> bool:
         """Keep reads back that are not usual; return True if another read is due."""
         while (job := self.queue.first(now)) is not None:
-            if self._is_usual(job):
+            if self._trust.is_usual(job):
                 return True
             self.queue.take(now)
             self.queue.undo_turn()
             self._keep_back(job)
-        return any(job.due <= now and not self._failures(job) for job in self.kept_back)
+        return any(job.due <= now and not self._trust.failures(job) for job in self.kept_back)
 
     def next_due(self) -> float:
         """Return when the next read or probe is due (clock value in s), infinite for never."""

@@ -24,7 +24,8 @@ from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import LineTime
 from abdf1_ros.driver.job_tasks import Job
 from abdf1_ros.driver.kernel.flights import Flight
-from abdf1_ros.driver.kernel.kernel import Kernel, Turn
+from abdf1_ros.driver.kernel.gate import Turn
+from abdf1_ros.driver.kernel.kernel import Kernel
 from abdf1_ros.driver.reads.readings import Readings
 from abdf1_ros.driver.write import key_of, Outcome, Write, WriteResult
 from abdf1_ros.driver.writes.packets import carry_out
@@ -99,7 +100,9 @@ class WritesUnderWay:
         write, result, station = job.write, job.result, job.station
         now, begun = self._line.now, job.flight.begun
         if not write.is_own:
-            self._kernel.told(job.flight, result, is_read=self._readings.are_read(write.mapping))
+            is_read = any(block.extent.holds(write.mapping.extent)
+                          for block in self._readings.blocks)
+            self._kernel.told(job.flight, result, is_read=is_read)
         if station != BROADCAST and not (job.is_free and write.is_probe):
             self._stations.tried(station, begun, now, was_silent=write.is_probe, asker=job.asker)
         if isinstance(result.error, RemoteError):

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from abdf1_ros.driver.kernel.flights import Flights, Words
-from abdf1_ros.driver.kernel.kernel import Kernel
+from abdf1_ros.driver.kernel.gate import Gate
 from abdf1_ros.driver.kernel.rows import OwnRows
 from explorer.explore import Exploration, Told
 from explorer.plants import PLANTS
@@ -46,7 +46,7 @@ def test_each_story_of_the_kernel_is_sound_and_comes_to_rest(name: str) -> None:
     (Flights, 'forget', lambda flights, station=None: None, 'repeated', 'does not stand'),
     (OwnRows, 'is_overruled', lambda rows, write: False, 'cell', '(9)'),
     (OwnRows, 'why_refused', lambda rows, write: '', 'single', '(28)'),
-    (Kernel, '_proof', lambda kernel, write, now: 'it', 'cell', 'does not stand')])
+    (Gate, '_proof', lambda gate, write, now: 'it', 'cell', 'does not stand')])
 def test_story_of_the_kernel_shows_a_mistake(
         owner: type, name: str, made: Any, plant: str, demand: str,
         monkeypatch: pytest.MonkeyPatch) -> None:

@@ -33,7 +33,8 @@ from abdf1_ros.df1.probes import Asker
 from abdf1_ros.df1.stations import ActiveStationList, Station
 from abdf1_ros.driver.kernel.fallback import FallbackRow, FallbackState
 from abdf1_ros.driver.kernel.flights import Words
-from abdf1_ros.driver.kernel.kernel import ForeignValue, Kernel, News, Rank, Refused, Turn
+from abdf1_ros.driver.kernel.gate import Rank, Turn
+from abdf1_ros.driver.kernel.kernel import ForeignValue, Kernel, News, Refused
 from abdf1_ros.driver.kernel.own import Crowd
 from abdf1_ros.driver.kernel.plc import OwnRow
 from abdf1_ros.driver.write import Outcome, Write
@@ -157,6 +158,7 @@ class Tiny:
         self.hung_until = self.ends_at = -math.inf
         self.reloads_at = math.inf
         self.is_crowded = False
+        self._published: dict[str, float] = {}  # by topic, the youngest
         self._table: defaultdict[str, int] = defaultdict(int)
         self.stations = ActiveStationList(self.rows.stations, self._station_changed)
         for station in self.stations:
@@ -268,6 +270,7 @@ class Tiny:
         published = self.now - (0.75 if kind == 'old' else 0.0)
         value = 2 if kind == 'same' else 2 + self._names % 3
         self.asks[name] = published
+        self._published[row.topic] = max(published, self._published.get(row.topic, -math.inf))
         self.kernel.asked(Write(row, [value], published, name), self.now)
 
     def _download(self) -> None:
@@ -501,6 +504,11 @@ class Tiny:
         self._demand(self.stations[row.station].active, 'counts at a silent PLC (4)')
         self._demand(now <= self.hung_until - 2.0 + 1.0 or now >= self.hung_until,
                      'counts while the executor stands still (3 c)')
+        condition = row.condition
+        for topic in condition.names if condition else ():
+            assert condition is not None and condition.timeout is not None
+            self._demand(now < self._published.get(topic, -math.inf) + condition.timeout / 1000,
+                         f'counts without {topic} (3 d)')
         for other in self.rows.fallbacks.of_plcs:
             facts = self.facts[other.tag]
             if other.station != row.station:

@@ -246,7 +246,7 @@ def _polls_before(carry_out: Any) -> Any:
 
 
 def _awaits_those_that_answer(before: Any) -> Any:
-    return property(lambda self: not self._plc_of or self.conditions.are_all_due and not any(
+    return property(lambda self: not self._plc_of or self._conditions.are_all_due and not any(
         row.mapping.station in self._awaited for row in self._plc_of if not row.is_confirmed))
 
 
