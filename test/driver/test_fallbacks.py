@@ -906,6 +906,16 @@ def test_rule_12_fallback_of_a_serve_row_goes_into_our_own_table(ours: int, thei
     assert words(other) == b'\x08\0'  # at the end at once
 
 
+def test_rule_12_fallback_of_a_serve_row_is_stored_once_when_it_is_due(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    bench = DriverBench([make_mapping('N7:0', 'Serve', station=0, fallback=FALLBACK)],
+                        start=False)
+    stored: list[object] = []
+    monkeypatch.setattr(bench.driver.served, 'store', lambda row, values: stored.append(values))
+    bench.open(run=3.0)
+    assert len(stored) == 1
+
+
 def test_rule_17_fallback_has_one_result_and_its_retries_have_none() -> None:
     cell, speed = speed_cell()
     cell.publish(speed, 3, run=0.1)

@@ -188,7 +188,7 @@ class Kernel:
         elif not write.mapping.serves:
             self.waiting.add(write, now)
         else:
-            self._store(write)
+            self._store(self._begin_here(write))
             self._tell(write, Outcome.WRITTEN)
 
     def _reasons(self, write: Write, now: float) -> WriteReasons:
@@ -266,14 +266,18 @@ class Kernel:
             self.end.begin(now)
         if now >= self.rows.ours.looks.first:
             for own in self.rows.ours.ready(self.waiting.youngest(), now):
-                own.trial = self._store(own.take(now))
+                own.trial = self._begin_here(own.take(now))
+                self._store(own.trial)
 
-    def _store(self, write: Write) -> Flight:
-        """Write to our own table."""
-        flight = self.flights.begin(OUR_TABLE, (write.mapping.extent,), write)
+    def _begin_here(self, write: Write) -> Flight:
+        """Begin a write to our own table."""
+        return self.flights.begin(OUR_TABLE, (write.mapping.extent,), write)
+
+    def _store(self, flight: Flight) -> None:
+        write = flight.write
+        assert write is not None
         self._table.store(write.mapping, write.raw)
         self.ended(flight, Outcome.WRITTEN)
-        return flight
 
     # Who goes next
 
