@@ -555,14 +555,17 @@ class Telling:
 
     def _demand_belief(self) -> None:
         """Demand that each word holds what the driver believes: a Fallback, or 0."""
-        unseen = () if self.scene.is_refreshed else (OTHERS,)
+        world = self.world
         for row, value in self._own_words():
+            # at an opening, and with refreshes, it is written again (8)
+            is_unseen = value == OTHERS and not self.scene.is_refreshed \
+                and world.overwritten[row.tag] > max(world.opened, world.killed_at)
             if row.is_heartbeat and not (row.condition and row.condition.names) \
                     or self._is_unknowable(row.tag):
                 continue
-            if value not in (0 if row.is_heartbeat else SAFE, *unseen):
+            if value != (0 if row.is_heartbeat else SAFE) and not is_unseen:
                 raise Broken('Belief', f'{row.tag} is at rest for the driver, and holds {value}',
-                             self.world)
+                             world)
 
     def _recover(self) -> None:
         """Demand that messages are written, and that the heartbeats count."""
