@@ -144,9 +144,11 @@ class OrderlyEnd:
         """Return the tags of rows that are not confirmed at the end, or may be overwritten."""
         tags = [row.mapping.tag for row in self._unconfirmed_rows()]
         held = {row.mapping.tag: row.words.lands_until - now for row in self._of_plcs
-                if row.mapping.tag not in tags and row.words.lands_until > now}
-        return [*tags, *(f'{tag} (a gateway may hold a write to it for {seconds:.1f} s)'
-                         for tag, seconds in held.items())]
+                if row.mapping.tag not in tags and row.words.lands_until > -math.inf}
+        return [*tags, *(
+            f'{tag} (a gateway may hold a write to it for {seconds:.1f} s)' if seconds > 0
+            else f'{tag} (a gateway may have delivered a write to it since)'
+            for tag, seconds in held.items())]
 
     def not_repeated(self) -> list[str]:
         """Return the tags of rows that stood when the end began, and were not confirmed again."""

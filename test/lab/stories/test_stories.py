@@ -86,7 +86,9 @@ def test_story_of_a_large_scene_can_be_told(name: str, text: str) -> None:
     # New files without the heartbeat of one station, and with that of another.
     ('two', 'at 0.05: reload beat gone'),
     # A process that is killed in the moment in which its number goes out.
-    ('little crowd', 'at 1.3: kill 0.3')])
+    ('little crowd', 'at 1.3: kill 0.3'),
+    # A late number may have landed after the last 0 of an end: the end names the word.
+    ('little last', 'write 5: kept last\nwrite 7: refused')])
 def test_story_that_was_told_wrongly_once(name: str, text: str) -> None:
     assert tell_broken(name, text) == ''
 
