@@ -487,7 +487,6 @@ class Beats(Rule):
         self._driver: dict[str, int] = {}
         self._stood = max(_LEAST_ZERO, world.plant.period / 1000)
         self._sent: dict[str, Sent] = {}
-        self._late: dict[str, Executed] = {}  # own values that came late over a 0
 
     def sent(self, entry: Sent) -> None:
         """Judge what a heartbeat vouches for when it goes out (3 c, d)."""
@@ -512,14 +511,9 @@ class Beats(Rule):
                         entry, 'without 0 although nothing came at', gap)
 
     def executed(self, entry: Executed) -> None:
-        if not entry.tag.startswith(('beat', 'other')):
+        if not entry.tag.startswith(('beat', 'other')) or entry.is_late:
             return
         tag, value = entry.tag, entry.value
-        if entry.is_late:
-            if entry.value and entry.before == 0 and entry.driver >= self.world.process:
-                self._late[tag] = entry
-            return
-        late = self._late.pop(tag, None)
         if value in GUESTS:
             if entry.before == 0:
                 self._over.add(tag)
@@ -541,8 +535,6 @@ class Beats(Rule):
             self.demand(not last or value in (last, *following), entry, 'after', last)
             if not last:
                 stood = self._stood if is_ours else _LEAST_ZERO
-                self.demand(late is None or late.value != entry.before, entry,
-                            'over a late value:', late)
                 self.demand(entry.when - self._zero[tag] >= stood - 1e-6, entry,
                             '0 stood since', self._zero[tag])
         if entry.is_told:

@@ -118,8 +118,6 @@ def _always(value: object) -> Callable[..., object]:
     (Words, 'may_hold', _always(True), 'little run', 'at 0.9: foreign', 'Noticed'),
     (OrderlyEnd, 'keeps_line', property(_always(False)), 'little last', 'write 3: no reply',
      'Unread'),
-    (HeartbeatRow, 'again_at', property(_always(math.inf)), 'little zero', 'write 2: kept last',
-     'Beats'),
     (OwnRows, 'is_overruled', _always(False), 'little race', 'at 0.53: slow 0.04', 'Named'),
     (Words, '_is_settled', _always(True), 'little again via', 'at 0.05: before speed last',
      'Stands'),
