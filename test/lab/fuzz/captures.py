@@ -105,9 +105,13 @@ def _check_written(chunks: Sequence[Chunk], settings: dict[str, str]) -> None:
     again = Recording(path)
     assert list(again.chunks()) == [
         chunk._replace(time=round(chunk.time or 0.0, 6), guest='') for chunk in chunks]
-    assert again.settings == {  # a capture is ASCII
-        name: printable(value).encode('ascii', 'backslashreplace').decode()
-        for name, value in settings.items()}
+    assert again.settings == {
+        _ascii(name): _ascii(printable(value)) for name, value in settings.items()}
+
+
+def _ascii(text: str) -> str:
+    """Return a text as a capture has it, which is ASCII."""
+    return text.encode('ascii', 'backslashreplace').decode()
 
 
 def _check_told(chunks: Sequence[Chunk], settings: dict[str, str]) -> None:
