@@ -188,7 +188,7 @@ class Kernel:
         elif not write.mapping.serves:
             self.waiting.add(write, now)
         else:
-            self._store(self._begin_here(write))
+            self._store(self.flights.begin(OUR_TABLE, (write.mapping.extent,), write))
             self._tell(write, Outcome.WRITTEN)
 
     def _reasons(self, write: Write, now: float) -> WriteReasons:
@@ -266,14 +266,12 @@ class Kernel:
             self.end.begin(now)
         if now >= self.rows.ours.looks.first:
             for own in self.rows.ours.ready(self.waiting.youngest(), now):
-                own.trial = self._begin_here(own.take(now))
+                own.trial = self.flights.begin(
+                    OUR_TABLE, (own.mapping.extent,), own.take(now))
                 self._store(own.trial)
 
-    def _begin_here(self, write: Write) -> Flight:
-        """Begin a write to our own table."""
-        return self.flights.begin(OUR_TABLE, (write.mapping.extent,), write)
-
     def _store(self, flight: Flight) -> None:
+        """Carry out a write to our own table."""
         write = flight.write
         assert write is not None
         self._table.store(write.mapping, write.raw)
