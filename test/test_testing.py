@@ -146,6 +146,25 @@ def test_fixture_takes_no_word_for_what_is_none(
         assert plc.read('N7:0') == 0
 
 
+@pytest.mark.parametrize('station', ['1', 1.0])
+def test_station_that_is_no_whole_number_is_named(
+        station: object, abdf1_plcs: Callable[..., Plcs]) -> None:  # noqa: F811
+    plcs: Any = abdf1_plcs('Station,PLC_Type,Address\n1,SLC,N7:0\n')
+    for call in (lambda: plcs[station], lambda: plcs.word('N7:0', station=station),
+                 lambda: plcs.set('N7:0', 1, station=station)):
+        with pytest.raises(TypeError, match=f'^station {station!r} should be a whole number$'):
+            call()
+
+
+def test_data_of_plcs_are_a_file_in_the_working_folder_too(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path('data.csv').write_text('Station,PLC_Type,Address,Values\n1,SLC,N7:0,5\n')
+    for data in ('data.csv', Path('data.csv')):
+        with Plcs(data) as plcs, plcs.client(plc_type='SLC') as plc:
+            assert plc.read('N7:0') == 5
+
+
 def test_what_never_happens_is_named(
         abdf1_cell: Cells, monkeypatch: pytest.MonkeyPatch) -> None:  # noqa: F811
     monkeypatch.setattr('abdf1_ros.testing.cell.PATIENCE', 0.2)

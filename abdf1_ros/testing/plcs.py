@@ -48,11 +48,11 @@ class Plcs:
     another test.
     """
 
-    def __init__(self, data: Path, ladders: Sequence[int] = ()) -> None:
+    def __init__(self, data: Path | str, ladders: Sequence[int] = ()) -> None:
         self._plcs = load_plcs(str(data), Checksum.CRC, time.monotonic, threading.RLock)
         for station in ladders:
             self[station].run_ladder(Ladder(self[station].table))
-        self._folder = data.parent
+        self._folder = Path(data).absolute().parent
         self._line = PtyEndpoint(str(self._folder / 'plcs'))
         self.port = self._line.name
         self.faults: list[Exception] = []
@@ -70,6 +70,8 @@ class Plcs:
         assert not self.faults
 
     def __getitem__(self, station: int) -> SimulatedPlc:
+        if not isinstance(station, int):
+            raise TypeError(f'station {station!r} should be a whole number')
         for plc in self._plcs:
             if plc.station == station:
                 return plc
