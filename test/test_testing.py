@@ -32,8 +32,8 @@ from abdf1_ros.df1 import frames
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.ros import observer
 from abdf1_ros.ros.topics.messages import latched_qos
-from abdf1_ros.testing import abdf1_cell, abdf1_plcs
 from abdf1_ros.testing.cell import Bridge, Observer, PATIENCE, SimulatedCell
+from abdf1_ros.testing.fixtures import abdf1_cell, abdf1_plcs
 from abdf1_ros.testing.plcs import Plcs
 import pytest
 from rcl_interfaces.srv import GetParameters
@@ -111,6 +111,15 @@ def test_plcs_of_the_tutorial_need_no_ros(tmp_path: Path) -> None:
     assert '3 passed, 1 error' in said
     assert re.search(r'abdf1_cell needs ROS 2 \(.*rclpy.*\): is it sourced', said)
     assert 'Traceback' not in said and 'site-packages' not in said
+
+
+def test_plcs_need_no_pytest(tmp_path: Path) -> None:
+    (tmp_path / 'data.csv').write_text('Station,PLC_Type,Address\n1,SLC,N7:0\n')
+    subprocess.run(
+        [sys.executable, '-c', 'import sys; sys.modules["pytest"] = None\n'
+         'from abdf1_ros.testing.plcs import Plcs\n'
+         'with Plcs("data.csv") as plcs:\n    assert plcs.word("N7:0") == 0'],
+        cwd=tmp_path, check=True, timeout=60)
 
 
 def test_each_line_of_plcs_is_its_own(abdf1_plcs: Callable[..., Plcs]) -> None:  # noqa: F811

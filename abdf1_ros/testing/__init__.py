@@ -17,61 +17,13 @@ Fixtures of pytest for programs and nodes that need PLCs; see docs/tutorials/tes
 
 ``pytest_plugins = ['abdf1_ros.testing']`` in a conftest.py makes two of them available:
 ``abdf1_plcs`` has simulated PLCs for a Python program, and ``abdf1_cell`` also a bridge and an
-observer of its topics. Only ``abdf1_cell`` needs ROS 2. Where ROS 2 is installed, importing this
-module keeps all topics on this machine, in a ROS domain of its own.
+observer of its topics. Only ``abdf1_cell`` needs ROS 2. Where ROS 2 is installed, the plugin keeps
+all topics on this machine, in a ROS domain of its own.
 """
 
-from __future__ import annotations
-
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack
-from itertools import count
-from pathlib import Path
-from typing import TYPE_CHECKING
-
 from abdf1_ros.testing.plcs import Plcs
-import pytest
 
-if TYPE_CHECKING:
-    from abdf1_ros.testing.cell import SimulatedCell
+__all__ = ['Plcs', 'pytest_plugins']
 
-_LACKING = ''
-try:  # now, because a program of the test may make the first context
-    from abdf1_ros.testing import cell as _cell
-except ImportError as error:
-    _LACKING = str(error)
-
-
-@pytest.fixture
-def abdf1_plcs(tmp_path: Path) -> Iterator[Callable[..., Plcs]]:
-    """
-    Return a function that makes ``Plcs`` of the text of a simulator CSV; they end with the test.
-
-    Each call makes a line of its own. ``ladders`` are stations with the program of
-    docs/tutorials/heartbeats.md.
-    """
-    numbers = count(1)
-    with ExitStack() as stack:
-        def made(data: str, ladders: Sequence[int] = ()) -> Plcs:
-            folder = tmp_path / f'line{next(numbers)}'
-            folder.mkdir()
-            (folder / 'data.csv').write_text(data, encoding='utf-8')
-            return stack.enter_context(Plcs(folder / 'data.csv', ladders))
-
-        yield made
-
-
-@pytest.fixture
-def abdf1_cell(tmp_path: Path) -> Iterator[Callable[..., SimulatedCell]]:
-    """
-    Return a function that makes a ``SimulatedCell`` of texts; the cell ends with the test.
-
-    Its context is the default one, so a node of the test needs no context as an argument.
-    """
-    if _LACKING:
-        pytest.fail(f'abdf1_cell needs ROS 2 ({_LACKING}): is it sourced, as by '
-                    '". /opt/ros/jazzy/setup.bash"? abdf1_plcs does without', pytrace=False)
-    with ExitStack() as stack:
-        context = stack.enter_context(_cell.default_context())
-        yield lambda *texts, **options: stack.enter_context(
-            _cell.SimulatedCell(tmp_path, *texts, context=context, **options))
+# A module of its own, so that Plcs do without pytest.
+pytest_plugins = ['abdf1_ros.testing.fixtures']

@@ -69,7 +69,7 @@ def test_users_get_what_is_imported(folder: str) -> None:
 def test_only_the_fixture_for_tests_imports_pytest() -> None:
     using = [path.relative_to(ROOT).as_posix() for path in (ROOT / 'abdf1_ros').rglob('*.py')
              if 'import pytest' in path.read_text(encoding='utf-8')]
-    assert using == ['abdf1_ros/testing/__init__.py']
+    assert using == ['abdf1_ros/testing/fixtures.py']
 
 
 def test_users_get_no_more_than_is_imported() -> None:
