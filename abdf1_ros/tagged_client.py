@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 import logging
+from types import MappingProxyType
 from typing import Literal, overload
 
 from abdf1_ros.df1.stations import ActiveStationList, MAX_STATION
@@ -68,8 +69,9 @@ class TaggedClient(BlockingClient):
         problems += [problem for _, problem in line_problems(mappings, network)]
         if problems:
             raise ConfigurationError(problems)
-        self.rows = {row.tag: row for row in mappings.of_plcs
-                     if (row.polls or row.writes) and row.station <= MAX_STATION}
+        self.rows = MappingProxyType({
+            row.tag: row for row in mappings.of_plcs
+            if (row.polls or row.writes) and row.station <= MAX_STATION})
         super().__init__(OpenLine(
             network.line_mode, network.line, PortSettings.of(network),
             ActiveStationList(routes={row.station: row.via for row in mappings

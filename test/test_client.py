@@ -577,6 +577,8 @@ def test_rows_of_a_map_are_read_and_written_by_their_tags(
         port: str, tmp_path: Path, plcs: PlcPair) -> None:
     with Client.from_files(*files(tmp_path, port)) as plant:
         assert list(plant.rows) == ['speed', 'doors', 'recipe', 'name', 'far']
+        with pytest.raises(TypeError):  # the rows are those of the map
+            plant.rows['far'] = plant.rows['speed']  # type: ignore[index]
         plant.write('speed', 12.34)
         assert stored(plcs[0], 'N7:0') == (123).to_bytes(2, 'little')
         assert plant.read('speed') == pytest.approx(12.3)
