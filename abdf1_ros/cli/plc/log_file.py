@@ -29,6 +29,7 @@ from datetime import datetime, timedelta, UTC
 from enum import Enum
 import errno
 import fcntl
+import io
 import json
 import os
 import re
@@ -198,10 +199,16 @@ class Log:
 
 
 class LogOutput(Log):
-    """The log on standard output; a file that ``>>`` continues keeps its one head."""
+    """
+    The log on standard output; a file that ``>>`` continues keeps its one head.
+
+    It is in UTF-8, as a file is: a program reads it, and an escape would be another value.
+    """
 
     def __init__(self, form: LogForm) -> None:
         super().__init__(form)
+        if isinstance(sys.stdout, io.TextIOWrapper):
+            sys.stdout.reconfigure(encoding='utf-8', errors='backslashreplace')
         self._is_continued = _is_our_output(form)
 
     def _put(self, text: str) -> None:

@@ -382,6 +382,23 @@ def test_output_that_the_shell_appends_has_one_head(line: str, tmp_path: Path) -
     assert sum(',the log goes on' in line.replace('"', '') for line in lines) == 1
 
 
+@pytest.mark.parametrize('form', ['csv', 'jsonl', 'influx'])
+def test_output_is_in_utf_8_as_a_file_is(form: str) -> None:
+    """Where the terminal is ASCII, too: an escape would be another text, and no JSON."""
+    program = (
+        'from datetime import datetime\n'
+        'from abdf1_ros.cli.plc.log_file import Cell, FORMS, LogOutput, LogRow\n'
+        'from abdf1_ros.cli.terminal import prepare_output\n'
+        'prepare_output()\n'
+        'now = datetime.now().astimezone()\n'
+        f'LogOutput(FORMS[{form!r}]).write([LogRow(now, 1, "ST9:0", "T\u00fcr", Cell.TEXT, '
+        '"\u00c4\u20ac")])\n')
+    said = subprocess.run(
+        [sys.executable, '-c', program], check=True, capture_output=True, timeout=60,
+        env=os.environ | {'PYTHONIOENCODING': 'ascii', 'PYTHONUTF8': '1'}).stdout
+    assert 'T\u00fcr'.encode() in said and '\u00c4\u20ac'.encode() in said
+
+
 def exchange(tns: int, words: str = '34 12 FE FF') -> bytes:
     """Return what another master and station 2 say for one read of N7:0 and N7:1."""
     command = Packet(2, 5, 0x0F, 0, tns, bytes.fromhex('A2 04 07 89 00 00'))
