@@ -1040,7 +1040,7 @@ class Foreign(Rule):
             assert found is not None
             value = int(found[1])
             last = next((entry for entry in reversed(world.executed) if entry.value == value
-                         and entry.tag.startswith(('beat', 'other'))), None)
+                         and entry.when <= when and entry.tag.startswith(('beat', 'other'))), None)
             is_ours = last is not None and last.tag.startswith('beat') and last.is_late \
                 and last.driver >= world.process and last.when > when - _READ_BACK_WITHIN
             self.demand(not is_ours, text, 'at', when, last)
