@@ -100,8 +100,8 @@ class WritesUnderWay:
         write, result, station = job.write, job.result, job.station
         now, begun = self._line.now, job.flight.begun
         if not write.is_own:
-            is_read = any(block.extent.holds(write.mapping.extent)
-                          for block in self._readings.blocks)
+            is_read = result.is_unconfirmed and any(
+                block.extent.holds(write.mapping.extent) for block in self._readings.blocks)
             self._kernel.told(job.flight, result, is_read=is_read)
         if station != BROADCAST and not (job.is_free and write.is_probe):
             self._stations.tried(station, begun, now, was_silent=write.is_probe, asker=job.asker)
