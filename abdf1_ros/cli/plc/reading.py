@@ -138,8 +138,9 @@ class RepeatedReads:
         self._link = LinkThread(self._driver.machine, port, while_sending=self._note_failures,
                                 longest_wait=_LONGEST_WAIT)
         self._news = NewReads()
+        # reads and failures, each counted when its result is on the way to the other thread
         self._reads: Counter[Mapping] = Counter()
-        self._failures = 0  # of all points, as far as they are noted
+        self._failures: dict[Mapping, int] = {}
         self._noted: dict[Mapping, str] = {}
 
     def run(self, count: int | None) -> int:
@@ -191,8 +192,8 @@ class RepeatedReads:
     def read(self, mapping: Mapping, values: Values) -> None:
         """Record the values of a read; called in the link thread."""
         self._noted.pop(mapping, None)
-        self._reads[mapping] += 1
         self._news.add(mapping, values)
+        self._reads[mapping] += 1
 
     def unreadable(self, *args: object) -> None:
         """Do nothing: the point has the reason, and no other event can happen here."""
@@ -207,12 +208,12 @@ class RepeatedReads:
         """Record the reads that have failed since the last call; called in the link thread."""
         if self._is_listening:
             self._note_unheard()
-        failures = sum(point.failures for point in self._points)
+        failures = {point.mapping: point.failures for point in self._points}
         if failures == self._failures:
             return
-        self._failures = failures
         for point in self._points:
             self._note_gap(point.mapping, point.error)
+        self._failures = failures
 
     def _note_gap(self, mapping: Mapping, reason: str | None) -> None:
         if reason is not None and self._noted.get(mapping) != reason:
@@ -229,5 +230,6 @@ class RepeatedReads:
     def _is_done(self, count: int | None) -> bool:
         if count is None:
             return False
-        return all(self._reads[point.mapping] + point.failures >= count
+        failures = self._failures
+        return all(self._reads[point.mapping] + failures.get(point.mapping, 0) >= count
                    for point in self._points)

@@ -26,6 +26,7 @@ import os
 from pathlib import Path
 import re
 import threading
+import time
 
 from abdf1_ros.cli.plc.data import mapping_of, Radix, Tags
 from abdf1_ros.cli.plc.reading import NewReads, NoValue, WatchedRead
@@ -119,6 +120,21 @@ def test_lost_line_is_shown(plcs: Plcs, capsys: Output) -> None:
     assert lines[:3] == [f'N7:0  {number}' for number in range(3)]
     assert lines[3].startswith('N7:0  no value: ')
     assert len(lines) == 4
+
+
+def test_loss_is_shown_also_if_the_thread_of_the_link_is_late(
+        plcs: Plcs, capsys: Output, monkeypatch: pytest.MonkeyPatch) -> None:
+    add = NewReads.add
+
+    def add_late(news: NewReads, mapping: Mapping, what: Values | NoValue) -> None:
+        if isinstance(what, NoValue):
+            time.sleep(0.3)
+        add(news, mapping, what)
+
+    monkeypatch.setattr(NewReads, 'add', add_late)
+    assert Counting(plcs, reads=3).run(4) == 1
+    assert [line.partition(': ')[0] for line in shown(capsys)] == [
+        'N7:0  0', 'N7:0  1', 'N7:0  2', 'N7:0  no value']
 
 
 def test_silent_station_is_shown(plcs: Plcs, capsys: Output) -> None:
