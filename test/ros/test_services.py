@@ -178,9 +178,10 @@ def test_hundred_callers_at_once_have_an_answer_each_and_more_are_refused(bench:
 
 def test_reload_answers_who_waits_and_closes_what_is_gone(bench: Bench) -> None:
     bench.plcs.say('delay 1 1500')
-    read = bench.hold(Trigger, READ + 'recipe', Trigger.Request())
-    written = bench.hold(SetBool, SET + 'horn', SetBool.Request(data=True))
     calls = bench.node.surroundings.services.calls
+    written = bench.hold(SetBool, SET + 'horn', SetBool.Request(data=True))
+    bench.ros.until(lambda: len(calls) == 1, 'the write, which has the line from then on')
+    read = bench.hold(Trigger, READ + 'recipe', Trigger.Request())
     bench.ros.until(lambda: len(calls) == 2, 'both calls')
     write_csv(bench.map, HEADER, ROWS[:1])
     assert bench.call(Trigger, 'reload', Trigger.Request()).success
