@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -178,14 +179,14 @@ class Holder:
 _ours: dict[str, Holder] = {}  # by line, what this program has open
 
 
-class _Closes:
+class _Closes(ABC):
     """Something that the end of ``with`` closes."""
 
     __slots__ = ()
 
+    @abstractmethod
     def close(self) -> None:
         """Close it."""
-        raise NotImplementedError
 
     def __enter__(self) -> Self:
         return self

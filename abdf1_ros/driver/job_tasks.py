@@ -21,6 +21,7 @@ error is raised in the generator.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Container, Hashable
 from inspect import GEN_CLOSED, getgeneratorstate
@@ -44,7 +45,7 @@ from abdf1_ros.pccc.notation import Effect
 _With = TypeVar('_With', Packet, LinkError)
 
 
-class Job:
+class Job(ABC):
     """
     Work with a station, one command at a time; each kind of job has a queue.
 
@@ -92,13 +93,13 @@ class Job:
     _tasks: JobTasks
     _steps: Steps[None]
 
+    @abstractmethod
     def steps(self, now: float) -> Steps[None]:
         """Return the steps of the job from ``now`` on (clock value in s)."""
-        raise NotImplementedError
 
+    @abstractmethod
     def ended(self, error: Exception | None) -> None:
         """React, once, to the end of the job: by itself, or by an unhandled ``error``."""
-        raise NotImplementedError
 
     def start(self, tasks: JobTasks, now: float) -> Job:
         """Begin, with the first command; return the job itself."""

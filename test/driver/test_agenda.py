@@ -98,6 +98,9 @@ class NinePackets(Job):
         for _ in range(9):
             yield 0x0F, b''
 
+    def ended(self, error: Exception | None) -> None:
+        """Pass over the end."""
+
 
 def test_connection_that_is_unheard_again_has_its_quick_questions_again() -> None:
     bench = Bench(make_job(period=0))

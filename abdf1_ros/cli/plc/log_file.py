@@ -22,6 +22,7 @@ station is about all addresses.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -168,7 +169,7 @@ class LogLost(Exception):
     """The log cannot be written any more; the text says why, and how much is in it."""
 
 
-class Log:
+class Log(ABC):
     """A log, row by row; a continued log has no second head. ``count`` is the number of rows."""
 
     def __init__(self, form: LogForm) -> None:
@@ -189,13 +190,13 @@ class Log:
             self._put('\n'.join(lines))
             self.count += len(lines)
 
+    @abstractmethod
     def _put(self, text: str) -> None:
         """Write lines at once; raises LogLost, and BrokenPipeError if the reader has left."""
-        raise NotImplementedError
 
+    @abstractmethod
     def close(self) -> None:
         """End the log."""
-        raise NotImplementedError
 
 
 class LogOutput(Log):

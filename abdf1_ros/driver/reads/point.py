@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from enum import Enum
 import math
 
@@ -238,7 +239,7 @@ def _content(values: Values) -> bytes | str:
     return values if isinstance(values, str) else values.tobytes()
 
 
-class Guard:
+class Guard(ABC):
     """
     One condition of a station, and the ``points`` that may be published while it holds.
 
@@ -256,6 +257,6 @@ class Guard:
         self.points.append(point)
         self._since[point.patience] = math.inf
 
+    @abstractmethod
     def why_not(self, point: ReadPoint, started: float, now: float) -> str:
         """Return why a value whose read began at ``started`` is withheld, empty if it is not."""
-        raise NotImplementedError

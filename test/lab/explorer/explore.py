@@ -51,7 +51,7 @@ _DECIDES = 'abdf1_ros.driver.kernel', 'abdf1_ros.driver.write'
 _FAR = 8.0  # s; two times that are further away from now are alike
 _MOST = 3  # larger counts are alike
 _PASSED_OVER = frozenset((  # statistics, caches of constants, and what is the same in all states
-    'plant', 'rows_', 'line', 'mapping', 'row', 'out', 'said', 'asks', 'executed', 'events',
+    'plant', 'line', 'mapping', 'row', 'out', 'said', 'asks', 'executed', 'events',
     'replies', 'last_heard', 'last_key', 'remote_errors', 'returns', 'silent_since',
     '_meeting', '_sharing', '_shared', '_names', '_choose', '_blocks', 'step_number'))
 

@@ -61,4 +61,4 @@ def test_story_is_told_again_by_its_choices() -> None:
     again = Told(PLANTS['cell'], tuple(first.choices), 3)
     assert first.lines == again.lines
     assert first.lines[:2] == ['step 1', '  event: old speed']
-    assert (0,) * 0 not in [*first.others(0)] and (1,) in [*first.others(0)]
+    assert (1,) in [*first.others(0)]

@@ -23,7 +23,6 @@ what the kernel believes it may hold (soundness), and what must not stand is rep
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 import math
@@ -159,7 +158,6 @@ class Tiny:
         self.reloads_at = math.inf
         self.is_crowded = False
         self._published: dict[str, float] = {}  # by topic, the youngest
-        self._table: defaultdict[str, int] = defaultdict(int)
         self.stations = ActiveStationList(self.rows.stations, self._station_changed)
         for station in self.stations:
             station.has_gateway = plant.has_gateway
