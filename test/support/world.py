@@ -480,19 +480,21 @@ class Clocks:
     def is_unknowable(self, tag: str, published: float, stamp: float, age: float,
                       now: float) -> bool:
         """
-        Tell whether a clock was ahead, and nothing that came lately can have shown that.
+        Tell whether a clock was ahead or set back, and nothing that the process knows shows it.
 
         A message that was late on its way for longer than its clock is ahead looks like a new one.
-        What the process knows is that its age is at least the time for which it stood still. This
-        is judged by the true time, not by what the process has seen of it.
+        So does one from before the clock was set back, once that is forgotten, after write_timeout
+        at the earliest. What the process knows is that its age is at least the time for which it
+        stood still. This is judged by the true time, not by what the process has seen of it.
         """
         allowed = self.allowed[tag]
         lead = stamp - published - (self._set_by if published >= self._set_at else 0.0)
-        return allowed is not None and lead > allowed \
-            and now - self._shown.get(tag, -math.inf) > LEAD_IS_KNOWN \
-            and age >= max((seconds for until, seconds in self._still
-                            if seconds > STILL_IS_SEEN and until <= now < until + STILL_COUNTS),
-                           default=0.0)
+        is_ahead = allowed is not None and lead > allowed \
+            and now - self._shown.get(tag, -math.inf) > LEAD_IS_KNOWN
+        is_forgotten = published < self._set_at < now - self._patience
+        return (is_ahead or is_forgotten) and age >= max(
+            (seconds for until, seconds in self._still
+             if seconds > STILL_IS_SEEN and until <= now < until + STILL_COUNTS), default=0.0)
 
 
 class World(DriverBench):
