@@ -43,7 +43,7 @@ def _help(name: str, called: str) -> int:
     from abdf1_ros.text import printable
     said, fault = name == '--version' or name in _HELP, ''
     if name and not said:
-        meant = get_close_matches(name, COMMANDS, 1)
+        meant = get_close_matches(name, (*COMMANDS, '--help', '--version'), 1)
         fault = f'{called}: "{printable(name)}" is not a command' \
             f'{f"; did you mean {meant[0]}?" if meant else ""}\n'
     listed = '\n'.join(f'  {command:10} {purpose}' for command, (_, purpose) in COMMANDS.items())

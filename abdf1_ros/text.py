@@ -18,11 +18,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from datetime import datetime, UTC
+import difflib
 import math
 import re
 
 # The beginning of a cell is enough to find it.
 _SHOWN = 100
+
+# --perod suggests --period, but --force does not suggest --port.
+_ALIKE = 0.7
 
 # The characters of a curve, the lowest first.
 BARS = '▁▂▃▄▅▆▇█'
@@ -79,6 +83,13 @@ def first(names: Sequence[str], most: int = 5) -> str:
     """Return at most ``most`` names as text, and the number of the remaining names."""
     more = f' and {len(names) - most} more' if len(names) > most else ''
     return printable(', '.join(names[:most])) + more
+
+
+def alike(name: str, options: Sequence[str]) -> list[str]:
+    """Return the long options that a name may mean: those that begin with it, or similar ones."""
+    name = name.partition('=')[0].strip('-').lower()
+    return [option for option in options if name and option[2:].startswith(name)] \
+        or difflib.get_close_matches(f'--{name}', options, 2, _ALIKE)
 
 
 def counted(number: int, name: str) -> str:

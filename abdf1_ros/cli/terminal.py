@@ -19,7 +19,6 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-import difflib
 import errno
 from functools import partial
 import io
@@ -41,7 +40,7 @@ from abdf1_ros.paths import expanded, ShowVersion
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.hints import pasted
 from abdf1_ros.signals import drop, limit_output
-from abdf1_ros.text import printable
+from abdf1_ros.text import alike, printable
 
 RED, YELLOW, GREEN = 31, 33, 32
 
@@ -58,8 +57,6 @@ ADVICE: dict[int | None, str] = {
                   'again',
     errno.ENOENT: '"plc ports" lists the ports of this machine'}
 """Advice by the number of an operating system error of a serial port."""
-
-_ALIKE = 0.7  # --perod suggests --period, but --force does not suggest --port
 
 _PROGRESS_DELAY = 2.0  # s; shorter work shows no progress
 
@@ -312,7 +309,7 @@ class _Parser(argparse.ArgumentParser):
         options = [name for name in self._option_string_actions if name.startswith('--')]
         meant = [f'{action.metavar} without {written}' for action in self._actions
                  if not action.option_strings and action.dest in (word, f'{word}s')] \
-            or _alike(word, options)
+            or alike(word, options)
         return f'; did you mean {" or ".join(meant)}?' if meant else ''
 
     def _surplus(self, words: Sequence[str]) -> str:
@@ -364,12 +361,6 @@ def is_port(word: str) -> bool:
     """Return True if a word is most likely the name of a port."""
     is_device = word.startswith(('/dev/tty', '/dev/serial/', 'tty')) and not Path(word).is_file()
     return is_device or '://' in word
-
-
-def _alike(name: str, options: Sequence[str]) -> list[str]:
-    """Return the options that a name may mean: those that begin with it, or similar options."""
-    return [option for option in options if name and option[2:].startswith(name)] \
-        or difflib.get_close_matches(f'--{name}', options, 2, _ALIKE)
 
 
 def command_parser(name: str, description: str | None,

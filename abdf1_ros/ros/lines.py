@@ -43,7 +43,8 @@ from abdf1_ros.ros.parameters.arguments import Arguments
 from abdf1_ros.ros.parameters.declared import take_given, wrong_names
 from abdf1_ros.ros.parameters.files import node_sections, parameter_files, parameter_tree
 from abdf1_ros.ros.parameters.values import usable
-from abdf1_ros.ros.process.main import EXIT_CONFIGURATION, Program, REFUSALS, run_ros
+from abdf1_ros.ros.process.main import Program, run_ros
+from abdf1_ros.ros.process.refusals import EXIT_CONFIGURATION, REFUSALS
 from abdf1_ros.ros.process.runner import Line, LinkFailed, Runner
 from abdf1_ros.ros.process.usage import parser_of
 from abdf1_ros.settings.heartbeats import LONGEST_END

@@ -269,6 +269,8 @@ def test_signal_where_nothing_is_under_way_ends_quietly(
     (['--version'], 0, f'abdf1_ros {package_version()}\n'),
     (['plcc'], 2, '"plcc" is not a command; did you mean plc?'),
     (['plc\x1b'], 2, r'"plc\x1b" is not a command'),
+    (['--verison'], 2, '"--verison" is not a command; did you mean --version?'),
+    (['plc', '--hlep'], 2, '"--hlep" is not a command; did you mean --help?'),
     (['plc', '\x1b'], 2, r'"\x1b" is not a command'),
     (['help'], 0, 'plc        read, write'), ([], 2, 'plc        read, write')])
 def test_first_word_that_is_no_command(given: list[str], status: int, told: str) -> None:

@@ -597,13 +597,15 @@ def test_two_topics_that_remaps_give_one_name_are_told_at_the_start(
     (['--ros-args', '-r', '__ns:=/cell/'], 'a namespace has names of letters, digits and '
      'underscores, each after one "/", and no "/" at its end; '),
     (['--ros-args', '__ns:=/cell'], '-r is missing before '),
+    (['--ros-args', '--log-level', 'verbose'],
+     'a level is debug, info, warn, error or fatal, for one logger NAME:=LEVEL; '),
     (['--ros-args', '-p'], ''),
     (['--ros-args', '--bogus'], ''),
     (['--ros-args', '-r', f'__ns:=/{240 * "n"}'], ''),
     (['--ros-args', '-r', f'__ns:=/{300 * "n"}'], ''),
     (['--ros-args', '-r', f'__node:={256 * "n"}'], '')],
     ids=['remap', 'colon', 'empty', 'bare', 'list', 'help', 'namespace', 'slashes', 'end',
-         'bare_name', 'parameter', 'unknown', 'topic', 'long', 'name'])
+         'bare_name', 'level', 'parameter', 'unknown', 'topic', 'long', 'name'])
 def test_unusable_arguments_are_told_in_one_line(
         refusal: Callable[..., list[str]], arguments: list[str], expected: str) -> None:
     """What follows our words is a text of rcl, which differs between versions of ROS."""
@@ -611,6 +613,15 @@ def test_unusable_arguments_are_told_in_one_line(
     (line,) = [line for line in lines if line.startswith('abdf1: ')]
     assert line.startswith(f'abdf1: bad arguments: {expected}')
     assert 'Traceback' not in ' '.join(lines)
+
+
+@pytest.mark.parametrize(('option', 'hint'), [
+    ('--log-lvl', '; did you mean --log-level?'),
+    ('--params-flie', '; did you mean --params-file?'),
+    ('--disable-rosout-log', '; did you mean --disable-rosout-logs?'), ('--bogus', '')])
+def test_unknown_option_of_ros_is_told_with_the_option_that_may_be_meant(
+        refusal: Callable[..., list[str]], option: str, hint: str) -> None:
+    assert refusal('--ros-args', option, 'x') == [f"abdf1: bad arguments: ['{option}', 'x']{hint}"]
 
 
 def test_security_that_ros_may_leave_out_is_told(

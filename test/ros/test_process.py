@@ -61,6 +61,21 @@ def test_slow_callback_is_no_pause_between_writes() -> None:
     assert writes_taken(*5000 * [(0.01, 1)]) == pytest.approx(100 * LAST_WRITES, abs=1)
 
 
+@pytest.mark.parametrize(('given', 'hint'), [
+    ('--log-lvl debug', 'did you mean --ros-args --log-level?'),
+    ('--log-level=debug', 'did you mean --ros-args --log-level?'),
+    ('--params-flie x', 'did you mean --ros-args --params-file?'),
+    ('--hlep', 'did you mean --help?'), ('--verison', 'did you mean --version?'),
+    ('--ros-arg', 'did you mean --ros-args?'),
+    ('net.csv map.csv', 'write parameters after --ros-args'),
+    ('-p', 'write parameters after --ros-args')])
+def test_unknown_argument_is_told_with_the_option_that_may_be_meant(
+        given: str, hint: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match='2'):
+        node.main(['node', *given.split()])
+    assert f'error: {given}: unknown argument; {hint}\n' in capsys.readouterr().err
+
+
 @pytest.mark.parametrize('handler', [signal.SIG_DFL, signal.SIG_IGN])
 def test_ends_with_its_terminal_but_not_under_nohup(
         handler: signal.Handlers, monkeypatch: pytest.MonkeyPatch,

@@ -45,6 +45,7 @@ from abdf1_ros.cli.terminal import (
 from abdf1_ros.cli.usage import parser_of
 from abdf1_ros.errors import FormatError
 from abdf1_ros.ros.observer import graph_hint
+from abdf1_ros.ros.process.refusals import refusal, REFUSALS
 from abdf1_ros.signals import limit_output
 from abdf1_ros.text import BARS
 from rclpy.utilities import remove_ros_args
@@ -201,7 +202,10 @@ def main(args: Sequence[str] | None = None) -> int:
     prepare_output()
     try:
         return _run(parser_of('monitor').parse_args(remove_ros_args(words)[1:]), words)
-    except (FormatError, RuntimeError, ValueError) as error:  # also rclpy's, for --ros-args
+    except REFUSALS as error:  # of rclpy, for --ros-args
+        _say(refusal(error)[1])
+        return EXIT_USAGE
+    except (FormatError, RuntimeError, ValueError) as error:
         _say(' '.join(str(error).split()))
         return EXIT_USAGE
     except OSError as error:

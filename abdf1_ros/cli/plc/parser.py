@@ -107,7 +107,8 @@ def check_order(parser: argparse.ArgumentParser, words: Sequence[str]) -> None:
     named = next((word for word in words if word in _verbs()), None)
     if first.startswith('-') and named:
         parser.error(f'options come after the command, as in "plc {named} ... {first} ..."')
-    meant = difflib.get_close_matches(first.lower(), _verbs(), 1)
+    meant = difflib.get_close_matches(
+        first.lower(), (*_verbs(), '--help', '--version'), 1)
     if looks_like_address(first):
         meant = [f'plc read {first}']
     parser.error(f'"{first}" is not a command' + (f'; did you mean {meant[0]}?' if meant else ''))

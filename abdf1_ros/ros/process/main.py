@@ -26,7 +26,6 @@ from contextlib import ExitStack
 import faulthandler
 import os
 from pathlib import Path
-import re
 import signal
 import sys
 import threading
@@ -37,18 +36,21 @@ from abdf1_ros.console import Console
 from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.ros.diagnostics.log import bug_text
 from abdf1_ros.ros.parameters.files import usable_files, with_home
+from abdf1_ros.ros.process.refusals import (
+    EXIT_CONFIGURATION,
+    EXIT_FAULT,
+    refusal,
+    REFUSALS,
+    unknown_argument,
+    wants_security,
+)
 from abdf1_ros.settings.heartbeats import LONGEST_END
 from abdf1_ros.signals import EndRequest
-from abdf1_ros.text import printable
 import rclpy
-from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.logging import get_logger, get_logging_directory
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
-
-EXIT_CONFIGURATION = 2
-EXIT_FAULT = 1
 
 # Times (s) after a signal by which the process has ended, and by which its nodes have left the
 # network. Before that, PLCs, pending writes and the last diagnostics take at most 8 s. systemd,
@@ -56,35 +58,8 @@ EXIT_FAULT = 1
 _END_LIMIT = LONGEST_END + 3.0
 _DESTRUCTION_LIMIT = LONGEST_END + 2.5
 
-# Errors of rclpy for bad names, parameters and arguments, or if ROS does not start. All other
-# errors are bugs.
-REFUSALS = (NameValidationException, ParameterException, rclpy_implementation.RCLError,
-            rclpy_implementation.UnknownROSArgsError)
-
-# How rclpy's errors about the log directory begin.
-_LOG_FAILURES = re.compile('.*Failed to create log directory|Failed opening file')
-
 # ROS arguments about the log file.
 _NO_LOG_FILE, _LOG_FILE_NAME = '--disable-external-lib-logs', '--log-file-name'
-
-# Words in rclpy's errors about bad arguments.
-_BAD_ARGUMENTS = re.compile("Couldn't parse|should not exceed|invalid node namespace")
-
-# Hints to put before an error: a pattern of the error, and the hint.
-_ADVICE = (
-    (r"^\['(?:__|~|/)[^']*:=", '-r is missing before '),
-    (r"^\['[^']*:=", '-p is missing before '),
-    (r"parameter override rule: '-p [\w.]+:='",
-     "a parameter has no value; for an empty text write NAME:=''; "),
-    (r"parameter override rule: '-p \w+=", 'a parameter is NAME:=VALUE, with a colon; '),
-    (r"override rule: '-p [\w.]+:=\[", 'put quotes around a text with [ or :; '),
-    (r"^\['--?[hv]", 'write this before --ros-args: '),
-    (r'remap rule: .*__ns:=/|invalid node namespace: (?!.*should not exceed)',
-     'a namespace has names of letters, digits and underscores, each after one "/", and no "/" at '
-     'its end; '),
-    (r'remap rule: .*__ns:=', 'a namespace begins with "/"; '),
-    (r'remap rule: .*__(?:node|name):=', 'a node name has letters, digits and underscores; '))
-
 
 _NOT_ENFORCED = (
     'ROS_SECURITY_STRATEGY is not Enforce: if ROS finds no keys, it starts without security, and '
@@ -132,7 +107,7 @@ def run_ros(name: str, parser: argparse.ArgumentParser,
                 _check_arguments(parser, usable)
                 stack.enter_context(Console(log_file(name, usable)))
                 _begin(usable)
-            if _wants_security() and os.environ.get('ROS_SECURITY_STRATEGY') != 'Enforce':
+            if wants_security() and os.environ.get('ROS_SECURITY_STRATEGY') != 'Enforce':
                 get_logger(name).warning(_NOT_ENFORCED)
             made = _made(make, given)
         except ConfigurationError as error:
@@ -140,7 +115,7 @@ def run_ros(name: str, parser: argparse.ArgumentParser,
                 get_logger(name).fatal(str(problem))
             return EXIT_CONFIGURATION
         except REFUSALS as error:
-            status, text = _refusal(error)
+            status, text = refusal(error)
             print(f'{name}: {text}', file=sys.stderr)
             return status
         program = made
@@ -164,8 +139,7 @@ def _ending_signals() -> Iterator[signal.Signals]:
 def _check_arguments(parser: argparse.ArgumentParser, given: list[str]) -> None:
     """End the process if there are arguments that are not for ROS."""
     if unknown := parser.parse_known_args(remove_ros_args(given)[1:])[1]:
-        parser.error(f'{printable(" ".join(unknown))}: unknown argument; write parameters after '
-                     '--ros-args')
+        parser.error(unknown_argument(unknown))
 
 
 def log_file(name: str, given: Sequence[str]) -> int | None:
@@ -197,10 +171,6 @@ def _begin(given: list[str]) -> None:
                    signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:  # for example an error of the log
         raise rclpy_implementation.RCLError(str(error)) from error
-
-
-def _wants_security() -> bool:
-    return os.environ.get('ROS_SECURITY_ENABLE') == 'true'
 
 
 def _made(make: Callable[[Sequence[str]], Program], given: list[str]) -> Program:
@@ -239,23 +209,3 @@ def _check_log_directory() -> None:
         raise ConfigurationError([Problem('environment', (
             'HOME is not set, so there is no directory for the log; set ROS_LOG_DIR to a '
             'directory that this user may write to'))])
-
-
-def _refusal(error: Exception) -> tuple[int, str]:
-    """
-    Return the exit status and a text for an error of rclpy.
-
-    Wrong arguments stay wrong. Other reasons may pass: while the machine starts, a disk or a
-    network may not be ready. Then a supervisor should try again.
-    """
-    text = printable(' '.join(str(error).split()))
-    if _LOG_FAILURES.match(text):
-        return EXIT_FAULT, f'{text}; set ROS_LOG_DIR to a directory that this user may write to'
-    may_pass = isinstance(error, RuntimeError) and \
-        not isinstance(error, rclpy_implementation.UnknownROSArgsError)
-    if may_pass and not _BAD_ARGUMENTS.search(text):
-        hint = '; ROS_SECURITY_ENABLE is true: set ROS_SECURITY_KEYSTORE, too' \
-            if text.endswith('error not set') and _wants_security() else ''
-        return EXIT_FAULT, f'ROS does not start: {text}{hint}'
-    advice = next((advice for pattern, advice in _ADVICE if re.search(pattern, text)), '')
-    return EXIT_CONFIGURATION, f'bad arguments: {advice}{text}'

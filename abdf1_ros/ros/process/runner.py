@@ -29,7 +29,7 @@ import time
 
 from abdf1_ros.ros.bridge.node import BridgeNode, end_together
 from abdf1_ros.ros.callbacks import Callbacks
-from abdf1_ros.ros.process.main import EXIT_FAULT
+from abdf1_ros.ros.process.refusals import EXIT_FAULT
 from abdf1_ros.ros.process.supervisor import Supervisor, Works
 from abdf1_ros.signals import EndRequest
 

@@ -455,6 +455,8 @@ def test_reason_is_told_for_a_node_that_is_not_heard(
     (('--period', '0'), '"0" should be a number of seconds above 0'),
     (('--wait', 'nan'), '"nan" should be a number of seconds above 0'),
     (('--ros-args', '-p', 'x'), "Couldn't parse"),
+    (('--ros-args', '--log-lvl', 'x'), 'did you mean --log-level?'),
+    (('--ros-args', 'a:=b'), '-p is missing before'),
 ])
 def test_bad_options_are_refused_in_one_line(
         args: tuple[str, ...], text: str, refused: Refused) -> None:
