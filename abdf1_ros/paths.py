@@ -12,7 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Where the files of this package are, their version, and paths that begin at the home folder."""
+"""
+Where the files and commands of this package are, and its version.
+
+A path that a user has typed may begin at the home folder.
+"""
 
 from __future__ import annotations
 
@@ -20,6 +24,9 @@ import argparse
 from contextlib import suppress
 import os
 from pathlib import Path
+import re
+import shlex
+import shutil
 import sys
 
 _PACKAGE = 'abdf1_ros'
@@ -67,6 +74,28 @@ def config_file(name: str) -> Path:
 def example_file(name: str) -> Path:
     """Return a file of examples/, from the same place as ``config_file``."""
     return _folder('examples') / name
+
+
+def called(name: str) -> str:
+    """Return the words that start a command of the package in this environment, for the shell."""
+    prefixes = os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)
+    if shutil.which('ros2') and any(
+            Path(prefix, 'lib', 'abdf1_ros', name).exists() for prefix in filter(None, prefixes)):
+        return f'ros2 run abdf1_ros {name}'
+    beside = Path(sys.executable).with_name
+    for script, words in ((shutil.which(name), name), (shutil.which('abdf1'), f'abdf1 {name}'),
+                          (str(beside(name)), shlex.quote(str(beside(name)))),
+                          (str(beside('abdf1')), f'{shlex.quote(str(beside("abdf1")))} {name}')):
+        # Other packages have commands of these names too, such as Node.js.
+        if script and Path(script).is_file() and b'abdf1_ros' in Path(script).read_bytes()[:1000]:
+            return words
+    return f'{shlex.quote(sys.executable)} -m abdf1_ros {name}'
+
+
+def as_called(name: str, text: str) -> str:
+    """Return a help text in which each example of a command begins as the command does here."""
+    start = f'  {called(name)}'
+    return re.sub(f'^  {name}(?= |$)', lambda _: start, text, flags=re.MULTILINE)
 
 
 def _folder(name: str) -> Path:

@@ -90,7 +90,7 @@ def said(*words):
 assert 'ports     list serial ports and adapters\\n    speeds    list the baud rates of a ' \\
     'serial port\\n' in said('--help'), said('--help')
 assert 'List the baud rates of a serial port.' in said('speeds', '--help')
-assert 'example:\\n  plc speeds --above 9600\\n' in said('speeds', '--help')
+assert 'plc speeds --above 9600\\n' in said('speeds', '--help')
 assert said('speeds', '--above', '40000') == '57600 115200\\nstatus 0\\n', said('speeds')
 assert said('speeds', '--above', '115200').endswith('status 1\\n')
 assert 'did you mean speeds?' in said('spedes')

@@ -19,6 +19,7 @@ import ast
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
+import re
 import signal
 import subprocess
 import sys
@@ -177,3 +178,48 @@ def test_alarm_of_the_last_output_does_not_kill_a_slow_end() -> None:
     ended = subprocess.run(
         [sys.executable, '-c', SLOW_END], capture_output=True, text=True, check=False)
     assert (ended.returncode, ended.stdout, ended.stderr) == (0, 'last words\n', '')
+
+
+def test_commands_are_told_as_they_can_be_pasted(
+        monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    venv, workspace = tmp_path / 'a venv' / 'bin', tmp_path / 'install'
+    for path, text in ((venv / 'plc', 'from abdf1_ros'), (venv / 'python', ''),
+                       (tmp_path / 'ros' / 'ros2', ''), (workspace / 'lib/abdf1_ros/plc', '')):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding='utf-8')
+        path.chmod(0o755)
+    (venv / 'node').write_text('#!/usr/bin/env node', encoding='utf-8')  # that of Node.js
+    monkeypatch.setattr(sys, 'executable', str(venv / 'python'))
+    monkeypatch.setenv('PATH', '/nowhere')
+    monkeypatch.delenv('AMENT_PREFIX_PATH', raising=False)
+    assert paths.called('plc') == f"'{venv}/plc'"
+    assert paths.called('node') == f"'{venv}/python' -m abdf1_ros node"
+    (venv / 'abdf1').write_text('from abdf1_ros', encoding='utf-8')
+    (venv / 'abdf1').chmod(0o755)
+    assert paths.called('node') == f"'{venv}/abdf1' node"
+    monkeypatch.setenv('PATH', f'{venv}:{tmp_path}/ros')
+    assert paths.called('plc') == 'plc'
+    assert paths.called('node') == 'abdf1 node'
+    monkeypatch.setenv('AMENT_PREFIX_PATH', f'/nowhere:{workspace}')
+    assert paths.called('plc') == 'ros2 run abdf1_ros plc'
+    assert paths.called('check') == 'abdf1 check'
+    monkeypatch.setenv('PATH', str(venv))  # without ros2
+    assert paths.called('plc') == 'plc'
+    assert paths.as_called('plc', 'plc\n  plc\n  plc read N7:0\n  plcs\n') == \
+        'plc\n  plc\n  plc read N7:0\n  plcs\n'
+    monkeypatch.setenv('PATH', f'{venv}:{tmp_path}/ros')
+    assert paths.as_called('plc', 'plc\n  plc\n  plc read N7:0\n  plcs\n') == (
+        'plc\n  ros2 run abdf1_ros plc\n  ros2 run abdf1_ros plc read N7:0\n  plcs\n')
+
+
+@pytest.mark.parametrize('name', sorted(COMMANDS))
+def test_examples_of_the_help_start_the_command_and_need_no_checkout(
+        name: str, monkeypatch: pytest.MonkeyPatch, capsys: Output) -> None:
+    monkeypatch.setattr(paths, 'called', lambda name: f'ros2 run abdf1_ros {name}')
+    monkeypatch.setattr(sys, 'argv', [name, '--help'])
+    with pytest.raises(SystemExit):
+        import_module(COMMANDS[name][0]).main()
+    told = capsys.readouterr().out
+    assert f'\n  ros2 run abdf1_ros {name}' in told
+    assert f'\n  {name} ' not in told and f'\n  {name}\n' not in told
+    assert not re.search(r'(?<!/)\bconfig/', told)

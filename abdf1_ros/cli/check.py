@@ -75,7 +75,7 @@ exit status: 0 if both files are good, also with warnings; 2 for errors;
              130 if interrupted by Ctrl-C
 
 examples:
-  check config/net.csv config/map.csv
+  check net.csv map.csv
   check --response-time 25 net.csv map.csv    the PLC needs 25 ms for each answer
   check --json net.csv map.csv | jq .load
   check --html cycle.html net.csv map.csv     the poll cycle as a picture

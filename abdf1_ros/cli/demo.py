@@ -38,7 +38,6 @@ import time
 
 from abdf1_ros.cli.simulator import Cast, parse_options
 from abdf1_ros.cli.terminal import (
-    called,
     drop_output,
     ignore_further,
     prepare_output,
@@ -46,7 +45,7 @@ from abdf1_ros.cli.terminal import (
 )
 from abdf1_ros.cli.usage import parser_of
 from abdf1_ros.driver.write import show
-from abdf1_ros.paths import config_file
+from abdf1_ros.paths import called, config_file
 from abdf1_ros.pccc.values import Values
 from abdf1_ros.ros.observer import claim_domain, ObservingNode
 from abdf1_ros.ros.topics.messages import latched_qos, MESSAGES

@@ -282,8 +282,7 @@ def _load(options: argparse.Namespace,
     With --full-duplex it is only the PLC that the option names. ``on_lamp`` gets the station, and
     what its ladder program reports.
     """
-    plcs = load_plcs(options.data or str(config_file('simulator.csv')),
-                     Checksum(options.check), time.monotonic, threading.RLock)
+    plcs = load_plcs(options.data, Checksum(options.check), time.monotonic, threading.RLock)
     if not plcs:
         raise ValueError(f'{options.data}: has no stations')
     if options.full_duplex is not None:
@@ -354,7 +353,8 @@ def parse_options(args: Sequence[str] | None) -> argparse.Namespace:
     """Return the options of the simulator."""
     parser = command_parser('simulator', __doc__, _EPILOG)
     parser.add_argument('--data', metavar='FILE', type=expanded,
-                        help='CSV of the data tables (default: config/simulator.csv)')
+                        default=str(config_file('simulator.csv')),
+                        help='CSV of the data tables (default: %(default)s)')
     line = parser.add_mutually_exclusive_group()
     line.add_argument('--pty', metavar='NAME', type=_name,
                       help='make a pseudo-terminal of this name (default: a new name, which is '

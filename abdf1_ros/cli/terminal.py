@@ -26,8 +26,6 @@ import math
 import os
 from pathlib import Path
 import re
-import shlex
-import shutil
 import signal
 import sys
 import time
@@ -36,7 +34,7 @@ from typing import Any, NoReturn, TextIO
 
 from abdf1_ros.errors import PortLost
 from abdf1_ros.numbers import decimal_number, whole_number
-from abdf1_ros.paths import expanded, ShowVersion
+from abdf1_ros.paths import as_called, expanded, ShowVersion
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.hints import pasted
 from abdf1_ros.signals import drop, limit_output
@@ -247,22 +245,6 @@ def page_option(path: str) -> str:
     return new_file(path, '--html', is_page)
 
 
-def called(name: str) -> str:
-    """Return the words that start a command of the package in this environment, for the shell."""
-    prefixes = os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)
-    if shutil.which('ros2') and any(
-            Path(prefix, 'lib', 'abdf1_ros', name).exists() for prefix in filter(None, prefixes)):
-        return f'ros2 run abdf1_ros {name}'
-    beside = Path(sys.executable).with_name
-    for script, words in ((shutil.which(name), name), (shutil.which('abdf1'), f'abdf1 {name}'),
-                          (str(beside(name)), shlex.quote(str(beside(name)))),
-                          (str(beside('abdf1')), f'{shlex.quote(str(beside("abdf1")))} {name}')):
-        # Other packages have commands of these names too, such as Node.js.
-        if script and Path(script).is_file() and b'abdf1_ros' in Path(script).read_bytes()[:1000]:
-            return words
-    return f'{shlex.quote(sys.executable)} -m abdf1_ros {name}'
-
-
 def table(head: Sequence[str], rows: Sequence[Sequence[str]], right: Sequence[int] = ()) -> str:
     """Return rows below a head, in columns; the columns in ``right`` are aligned right."""
     cells = [list(head), *map(list, rows)]
@@ -301,6 +283,10 @@ class _Parser(argparse.ArgumentParser):
             hint = self._meant(option) if option else self._surplus(unknown)
             self.error(f'unrecognized arguments: {" ".join(unknown)}{hint}')
         return found, unknown
+
+    def format_help(self) -> str:
+        """Return the help, with examples that start this command here."""
+        return as_called(self.prog.partition(' ')[0], super().format_help())
 
     def _meant(self, option: str) -> str:
         """Return which options an unknown option may mean."""

@@ -31,6 +31,7 @@ import resource
 import threading
 import time
 
+from abdf1_ros.paths import config_file
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.problems import ConfigurationError, Place, Problem
 from abdf1_ros.ros.bridge.node import BridgeNode
@@ -329,7 +330,8 @@ def chosen(names: Sequence[str], wanted: Sequence[str]) -> list[str]:
     if not names:
         raise ConfigurationError([Problem(
             'arguments', 'no line to run: give a parameter file with a section for each line, '
-            'as in --ros-args --params-file lines.yaml; config/three_lines.yaml is an example')])
+            'as in --ros-args --params-file lines.yaml; an example is '
+            f'{config_file("three_lines.yaml")}')])
     if not wanted:
         return list(names)
     meant = {text: [name for name in names if text in (name, _short(name))] for text in wanted}

@@ -368,30 +368,3 @@ def test_number_with_an_exponent_and_a_sign_is_no_option() -> None:
     parser.add_argument('values', nargs='+')
     assert parser.parse_args(['-1.5e3', '-2', '-.5', '-1E-3']).values == [
         '-1.5e3', '-2', '-.5', '-1E-3']
-
-
-def test_commands_are_told_as_they_can_be_pasted(
-        monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    venv, workspace = tmp_path / 'a venv' / 'bin', tmp_path / 'install'
-    for path, text in ((venv / 'plc', 'from abdf1_ros'), (venv / 'python', ''),
-                       (tmp_path / 'ros' / 'ros2', ''), (workspace / 'lib/abdf1_ros/plc', '')):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding='utf-8')
-        path.chmod(0o755)
-    (venv / 'node').write_text('#!/usr/bin/env node', encoding='utf-8')  # that of Node.js
-    monkeypatch.setattr(sys, 'executable', str(venv / 'python'))
-    monkeypatch.setenv('PATH', '/nowhere')
-    monkeypatch.delenv('AMENT_PREFIX_PATH', raising=False)
-    assert terminal.called('plc') == f"'{venv}/plc'"
-    assert terminal.called('node') == f"'{venv}/python' -m abdf1_ros node"
-    (venv / 'abdf1').write_text('from abdf1_ros', encoding='utf-8')
-    (venv / 'abdf1').chmod(0o755)
-    assert terminal.called('node') == f"'{venv}/abdf1' node"
-    monkeypatch.setenv('PATH', f'{venv}:{tmp_path}/ros')
-    assert terminal.called('plc') == 'plc'
-    assert terminal.called('node') == 'abdf1 node'
-    monkeypatch.setenv('AMENT_PREFIX_PATH', f'/nowhere:{workspace}')
-    assert terminal.called('plc') == 'ros2 run abdf1_ros plc'
-    assert terminal.called('check') == 'abdf1 check'
-    monkeypatch.setenv('PATH', str(venv))  # without ros2
-    assert terminal.called('plc') == 'plc'

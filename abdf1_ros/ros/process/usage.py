@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import argparse
 
-from abdf1_ros.paths import ShowVersion
+from abdf1_ros.paths import as_called, ShowVersion
 
 _NODE_USAGE = 'node --ros-args -p net_file:=net.csv -p map_file:=map.csv'
 
@@ -58,7 +58,7 @@ _TEXTS = {'node': (_NODE_USAGE, _NODE), 'lines': (_LINES_USAGE, _LINES)}
 
 def parser_of(name: str) -> argparse.ArgumentParser:
     """Return the parser of a command for --help and --version; it has only ROS arguments."""
-    usage, description = _TEXTS[name]
+    usage, description = (as_called(name, text) for text in _TEXTS[name])
     parser = argparse.ArgumentParser(
         prog=name, usage=usage, description=description,
         formatter_class=argparse.RawDescriptionHelpFormatter)

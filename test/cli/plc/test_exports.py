@@ -32,7 +32,7 @@ from pathlib import Path
 from abdf1_ros.cli.plc.command import main
 from abdf1_ros.cli.plc.exports.form import scaling, Unusable, Wanted, whole_length
 from abdf1_ros.cli.plc.exports.imported import import_map
-from abdf1_ros.cli.terminal import called
+from abdf1_ros.paths import called
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.map_file import load_mappings

@@ -31,12 +31,12 @@ from abdf1_ros.cli.plc import detect, line, overhear
 from abdf1_ros.cli.plc.command import main
 from abdf1_ros.cli.plc.init import listening_csv
 from abdf1_ros.cli.plc.verbs import init
-from abdf1_ros.cli.terminal import called
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.listen import SecondPort
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver import requests
 from abdf1_ros.driver.overheard import Carried
+from abdf1_ros.paths import called
 from abdf1_ros.pccc.describe import describe
 from abdf1_ros.settings.network import Network
 import pytest

@@ -34,8 +34,9 @@ from abdf1_ros.cli.plc.options import (
     DETECT_DEFAULTS,
 )
 from abdf1_ros.cli.plc.session import Session
-from abdf1_ros.cli.terminal import called, colour, EXIT_FAILED, GREEN
+from abdf1_ros.cli.terminal import colour, EXIT_FAILED, GREEN
 from abdf1_ros.errors import LinkError, RemoteError
+from abdf1_ros.paths import called
 
 _BEHIND_GATEWAY = (
     'a gateway: each PLC behind it has a node number. If a scan with --via finds no node, scan '

@@ -32,11 +32,11 @@ from abdf1_ros.cli.plc.exports.form import Wanted
 from abdf1_ros.cli.plc.exports.imported import import_map
 from abdf1_ros.cli.plc.options import add_folder, add_plc_type, DEFAULT_STATION, stations_option
 from abdf1_ros.cli.plc.session import complain
-from abdf1_ros.cli.terminal import called, EXIT_FAILED, EXIT_USAGE, number_option
+from abdf1_ros.cli.terminal import EXIT_FAILED, EXIT_USAGE, number_option
 from abdf1_ros.df1.stations import MAX_STATION
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.numbers import whole_number
-from abdf1_ros.paths import expanded
+from abdf1_ros.paths import called, expanded
 from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.plan.report import make_report

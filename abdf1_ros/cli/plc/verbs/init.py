@@ -40,7 +40,8 @@ from abdf1_ros.cli.plc.options import (
     DETECT_DEFAULTS,
 )
 from abdf1_ros.cli.plc.session import Session
-from abdf1_ros.cli.terminal import called, colour, EXIT_FAILED, GREEN, Progress
+from abdf1_ros.cli.terminal import colour, EXIT_FAILED, GREEN, Progress
+from abdf1_ros.paths import called
 from abdf1_ros.ports.listing import serial_ports
 from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings.network import Network
