@@ -193,16 +193,36 @@ def test_publishers_of_our_own_name_do_not_count(bench: Bench) -> None:
     assert len(bench.told(5, 10)) == 1
 
 
-def test_node_without_a_name_yet_gets_one_more_look(bench: Bench) -> None:
+def test_program_without_a_node_name_is_told_after_the_time_in_which_names_come(
+        bench: Bench) -> None:
     bench.told(0, 1)
     bench.domain.publishers[DOOR] += [UNKNOWN]
-    (now, text), = bench.told(1, 5)
+    (now, text), = bench.told(1, 9)
     assert text == f'a program without a node name publishes {DOOR} {IS_TOO}'
-    assert 1.5 < now < 3
+    assert 4.5 < now < 7
+    bench.domain.publishers[DOOR].remove(UNKNOWN)
+    bench.told(9, 11)
+    bench.domain.publishers[DOOR] += [UNKNOWN]
+    assert bench.told(11, 14) == []
+
+
+@pytest.mark.parametrize('name', ['/stub', '/press'])
+def test_node_whose_name_comes_late_is_never_told_without_it(bench: Bench, name: str) -> None:
+    bench.told(0, 1)
     bench.domain.publishers[LAMPS] += [UNKNOWN]
-    bench.told(5, 5.9)
-    bench.domain.publishers[LAMPS][-1] = '/stub'
-    assert [text for _, text in bench.told(5.9, 9)] == [f'/stub publishes {LAMPS} {IS_TOO}']
+    assert bench.told(1, 4.2) == []  # the first message about the node was lost
+    bench.domain.publishers[LAMPS][-1] = name
+    assert [text for _, text in bench.told(4.2, 9)] == [
+        f'/stub publishes {LAMPS} {IS_TOO}'][name == '/press':]
+
+
+def test_message_that_nobody_takes_is_told_with_a_name_that_comes_late(bench: Bench) -> None:
+    bench.domain.publishers |= {'/write/speed': [UNKNOWN], '/press/write/x': [UNKNOWN]}
+    assert bench.told(0, 3) == []
+    bench.domain.publishers['/write/speed'] = ['/hmi']
+    assert [text.partition(', ')[0] for _, text in bench.told(3, 9)] == [
+        '/press/write/x is published by a program without a node name',
+        '/write/speed is published by /hmi']
 
 
 def test_publisher_whose_name_cannot_be_read_is_told_too(bench: Bench) -> None:

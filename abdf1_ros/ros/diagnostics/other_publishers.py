@@ -23,7 +23,7 @@ once a second.
 from __future__ import annotations
 
 from collections import defaultdict, deque
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from itertools import chain, islice
 import math
 from typing import NamedTuple
@@ -45,16 +45,36 @@ _MOST_BESIDE = 40
 # question takes some 100 us.
 _NAMES_LAST = 10.0
 
+# Seconds in which the name of a new node comes, also if its first message is lost: Fast DDS sends
+# a message again after 3 s.
+_NAME_COMES = 3.5
+
 
 class _Publishers(NamedTuple):
-    """The number of publishers of a topic, their nodes, and until when (s) these are known."""
+    """
+    The number of publishers of a topic, and their nodes.
+
+    - ``until``: until when (s) the nodes need no further question
+    - ``nameless``: since when (s) one of them has no name; infinite if all have a name
+    """
 
     size: int
     nodes: frozenset[str]
     until: float
+    nameless: float = math.inf
 
 
 _NO_PUBLISHERS = _Publishers(0, frozenset(), 0.0)
+
+
+def _nameless(nodes: Collection[str], before: float, now: float) -> float:
+    """Return since when (s) a node has no name, if that was ``before`` at the last look."""
+    return min(before, now) if UNKNOWN_NODE in nodes else math.inf
+
+
+def _told(nodes: Collection[str], nameless: float, now: float) -> set[str]:
+    """Return the nodes to tell of: those with a name, and a node whose name does not come."""
+    return {*nodes} - ({UNKNOWN_NODE} if now < nameless + _NAME_COMES else set())
 
 
 class OtherPublisherWatch:
@@ -62,8 +82,7 @@ class OtherPublisherWatch:
     Reports other nodes that publish topics of ours.
 
     Nodes of our own full name do not count: an earlier run that was killed, a spare, or what
-    ``NameWatch`` reports. A node that has come this moment may have no name yet, so it gets one
-    more look.
+    ``NameWatch`` reports. A node that has come this moment may have no name yet.
     """
 
     def __init__(self, graph: Graph, our_name: str, names: TopicNames, seen: Seen) -> None:
@@ -104,13 +123,14 @@ class OtherPublisherWatch:
         before = self._crowded.pop(topic, _NO_PUBLISHERS)
         if (size := self._graph.count_publishers(topic)) < 2:
             return ()
-        is_new = UNKNOWN_NODE not in before.nodes
-        if size == before.size and now < before.until and is_new:
-            nodes, until = before.nodes, before.until
+        if size == before.size and now < before.until and before.nameless == math.inf:
+            found = before
         else:
-            nodes, until = frozenset(self._graph.publishers(topic)), now + _NAMES_LAST
-        self._crowded[topic] = _Publishers(size, nodes, until)
-        return tuple(sorted(nodes - {self._our_name, *([UNKNOWN_NODE] if is_new else ())}))
+            nodes = frozenset(self._graph.publishers(topic))
+            found = _Publishers(size, nodes, now + _NAMES_LAST,
+                                _nameless(nodes, before.nameless, now))
+        self._crowded[topic] = found
+        return tuple(sorted(_told(found.nodes, found.nameless, now) - {self._our_name}))
 
 
 class StrayWatch:
@@ -127,6 +147,7 @@ class StrayWatch:
         self._names = names
         self._seen = seen
         self._topics: GraphTopics | None = None
+        self._nameless: dict[str, float] = {}
 
     def look(self, now: float) -> list[News]:
         """Return the topics that are new at the clock value ``now`` (s), each once."""
@@ -134,15 +155,19 @@ class StrayWatch:
         if topics is self._topics:
             return []
         self._topics, before = topics, self._seen.strays
-        self._seen.strays = {} if self._seen.is_waiting() else dict(self._strays(topics))
+        self._seen.strays = {} if self._seen.is_waiting() else dict(self._strays(topics, now))
         return [News(WARN, 'topics beside ours', f'{topic} {text}')
                 for topic, text in self._seen.strays.items() if topic not in before]
 
-    def _strays(self, topics: GraphTopics) -> Iterator[tuple[str, str]]:
+    def _strays(self, topics: GraphTopics, now: float) -> Iterator[tuple[str, str]]:
         beside = chain(self._below(topics), self._beside(topics))
+        before, self._nameless = self._nameless, {}
         for topic, reason in islice(beside, _MOST_BESIDE):
-            if nodes := sorted({*self._graph.publishers(topic)}):
-                yield topic, f'is published by {first(nodes)}, but not written: {reason}'
+            nodes = self._graph.publishers(topic)
+            nameless = _nameless(nodes, before.get(topic, math.inf), now)
+            self._nameless[topic] = nameless
+            if told := sorted(_told(nodes, nameless, now)):
+                yield topic, f'is published by {first(told)}, but not written: {reason}'
 
     def _below(self, topics: GraphTopics) -> Iterator[tuple[str, str]]:
         """Yield topics below ``~/write/`` that are not ours, and why they are not."""
