@@ -34,6 +34,7 @@ from abdf1_ros.pccc.plc5 import commands as plc5
 from abdf1_ros.pccc.slc import commands as slc
 from abdf1_ros.pccc.slc.address import BY_CODE
 from abdf1_ros.pccc.typed_data import FLOAT
+from abdf1_ros.pccc.values import ValueType
 from abdf1_ros.settings.limits import check_foreign, has_limits
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.rows import Rows
@@ -87,7 +88,8 @@ def check_floats(command: Packet) -> None:
         raise FormatError('only a part of a float')
     for index, (value,) in enumerate(struct.iter_unpack('<f', data)):
         if not math.isfinite(value):
-            raise FormatError(f'value {value} at index {index} is not a valid float32')
+            raise FormatError(f'value {value} at index {index} is not a valid float32, '
+                              f'{ValueType.FLOAT32.form}')
 
 
 def _floats_of(command: Packet) -> bytes:

@@ -31,7 +31,7 @@ from abdf1_ros.pccc import strings
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.file_types import FileType
-from abdf1_ros.text import counted
+from abdf1_ros.text import counted, shown
 
 FLOAT_MAX = 3.4028234663852886e38  # the greatest float32
 
@@ -75,6 +75,18 @@ class ValueType(Enum):
     def is_part(self) -> bool:
         """Tell whether a value has only some bits of its words; a write keeps all other bits."""
         return self in (ValueType.BOOL, ValueType.BCD12)
+
+    @property
+    def form(self) -> str:
+        """Return what a value has to be, for users."""
+        if self is ValueType.STRING:
+            return 'a text (str)'
+        if self is ValueType.BOOL:
+            return '0 or 1'
+        if self is ValueType.FLOAT32:
+            return 'a number such as -1.5 or 2e3, at most 3.4e38'
+        low, high = self.range
+        return f'a whole number from {low:.0f} to {high:.0f}'
 
 
 class WordOrder(Enum):
@@ -167,7 +179,9 @@ class Codec:
     def check(self, values: Sequence[float] | str) -> None:
         """Raise FormatError, which names the wrong value, unless all values can be written."""
         if isinstance(values, str) is not (self.type is ValueType.STRING):
-            raise FormatError(f'{values!r} is not a valid {self.type.value}')
+            what = 'text' if isinstance(values, str) else 'value'
+            raise FormatError(f'the {what} {shown(repr(values))} is not a valid '
+                              f'{self.type.value}, {self.type.form}')
         if isinstance(values, str):
             self._encode_string(values)
             return
@@ -177,8 +191,8 @@ class Codec:
         for index, value in enumerate(values):
             is_whole = self.type is ValueType.FLOAT32 or value % 1 == 0
             if not low <= value <= high or not is_whole:  # also NaN
-                raise FormatError(
-                    f'value {value} at index {index} is not a valid {self.type.value}')
+                raise FormatError(f'value {value} at index {index} is not a valid '
+                                  f'{self.type.value}, {self.type.form}')
 
     def encode(self, values: Sequence[float] | str) -> bytes:
         """Return whole words for ``values`` that ``check`` has passed; not for parts of words."""

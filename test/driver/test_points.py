@@ -287,7 +287,8 @@ def test_bit_writes_touch_only_their_bits(
                                                    'Max 20'),
     ([9, 20], 'value 9 at index 0 is outside Min 10, Max 20'),
     ([1], '1 value, the mapping has 2'),
-    ([40000, 0], 'value 40000 at index 0 is not a valid int16')])
+    ([40000, 0], 'value 40000 at index 0 is not a valid int16, a whole number '
+                 'from -32768 to 32767')])
 def test_limits_hold_for_every_element(values: list[float], error: str | None) -> None:
     mapping = make_mapping(command='Write', length=2, minimum=10, maximum=20)
     if error is None:
@@ -337,7 +338,7 @@ def test_word_comes_back_from_the_value_that_was_published(
     ([1, -2e5], 'value -200000 at index 1 is outside -9830.4 to 9830.1, the range of int16 with '
                 'Scale 0.3, Offset 0'),
     ([1], '1 value, the mapping has 2'),
-    ('1', "'1' is not a valid int16")])
+    ('1', "the text '1' is not a valid int16, a whole number from -32768 to 32767")])
 def test_limits_of_engineering_values(values: list[float] | str, error: str | None) -> None:
     mapping = make_mapping(command='Write', length=2, minimum=0.3, maximum=10.1,
                            scaling=Scaling(0.3))

@@ -77,18 +77,30 @@ def test_word_that_is_not_bcd(word: str, text: str) -> None:
     (ValueType.INT16, [1], '1 value, the mapping has 2'),
     (ValueType.INT16, [1, 2, 3], '3 values, the mapping has 2'),
     (ValueType.INT16, [], '0 values, the mapping has 2'),
-    (ValueType.INT16, [0, 32768], 'value 32768 at index 1 is not a valid int16'),
-    (ValueType.INT16, [-32769, 0], 'value -32769 at index 0 is not a valid int16'),
-    (ValueType.UINT16, [0, -1], 'value -1 at index 1 is not a valid uint16'),
-    (ValueType.BCD16, [0, 10000], 'value 10000 at index 1 is not a valid bcd16'),
-    (ValueType.BOOL, [0, 2], 'value 2 at index 1 is not a valid bool'),
-    (ValueType.FLOAT32, [0.0, math.nan], 'value nan at index 1 is not a valid float32'),
-    (ValueType.FLOAT32, [math.inf, 0.0], 'value inf at index 0 is not a valid float32'),
-    (ValueType.FLOAT32, [-math.inf, 0.0], 'value -inf at index 0 is not a valid float32'),
-    (ValueType.INT16, [math.nan, 0], 'value nan at index 0 is not a valid int16'),
-    (ValueType.INT16, [1.0, 1.5], 'value 1.5 at index 1 is not a valid int16'),
-    (ValueType.INT16, 'ab', "'ab' is not a valid int16"),
-    (ValueType.STRING, [65, 66], '[65, 66] is not a valid string')])
+    (ValueType.INT16, [0, 32768], 'value 32768 at index 1 is not a valid int16, '
+     'a whole number from -32768 to 32767'),
+    (ValueType.INT16, [-32769, 0], 'value -32769 at index 0 is not a valid int16, '
+     'a whole number from -32768 to 32767'),
+    (ValueType.UINT16, [0, -1], 'value -1 at index 1 is not a valid uint16, '
+     'a whole number from 0 to 65535'),
+    (ValueType.BCD16, [0, 10000], 'value 10000 at index 1 is not a valid bcd16, '
+     'a whole number from 0 to 9999'),
+    (ValueType.BOOL, [0, 2], 'value 2 at index 1 is not a valid bool, '
+     '0 or 1'),
+    (ValueType.FLOAT32, [0.0, math.nan], 'value nan at index 1 is not a valid float32, '
+     'a number such as -1.5 or 2e3, at most 3.4e38'),
+    (ValueType.FLOAT32, [math.inf, 0.0], 'value inf at index 0 is not a valid float32, '
+     'a number such as -1.5 or 2e3, at most 3.4e38'),
+    (ValueType.FLOAT32, [-math.inf, 0.0], 'value -inf at index 0 is not a valid float32, '
+     'a number such as -1.5 or 2e3, at most 3.4e38'),
+    (ValueType.INT16, [math.nan, 0], 'value nan at index 0 is not a valid int16, '
+     'a whole number from -32768 to 32767'),
+    (ValueType.INT16, [1.0, 1.5], 'value 1.5 at index 1 is not a valid int16, '
+     'a whole number from -32768 to 32767'),
+    (ValueType.INT16, 'ab', "the text 'ab' is not a valid int16, "
+     'a whole number from -32768 to 32767'),
+    (ValueType.STRING, [65, 66], 'the value [65, 66] is not a valid string, '
+     'a text (str)')])
 def test_values_that_cannot_be_written(
         kind: ValueType, values: list[float] | str, error: str) -> None:
     with pytest.raises(FormatError) as caught:

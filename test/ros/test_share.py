@@ -200,10 +200,12 @@ def test_first_value_outside_of_a_limit_is_told_with_tag_and_limit() -> None:
     queue = DriverBench([row]).driver.guests
     places, notes = places_of()
     start = 'guest tcp:1: command refused: 0F/AA to station 1, protected typed logical write F8:'
+    no_number = ('value nan at index 0 is not a valid float32, a number such as -1.5 or 2e3, '
+                 'at most 3.4e38')
     for data, text in (
             ('00 00 00 00 30 41', '0 = 11; speed: value 11 at index 0 is outside Min 0, Max 10'),
-            ('00 00 00 00 C0 7F', '0 = nan; speed: value nan at index 0 is not a valid float32'),
-            ('09 00 00 00 C0 7F', '9 = nan; value nan at index 0 is not a valid float32')):
+            ('00 00 00 00 C0 7F', f'0 = nan; speed: {no_number}'),
+            ('09 00 00 00 C0 7F', f'9 = nan; {no_number}')):
         guest = Guest('tcp:1', ShareAccess.WRITE, places)
         for _ in range(2):
             queue.put(GuestCommand(guest, Packet(1, 9, 15, 0, 7, bytes.fromhex(

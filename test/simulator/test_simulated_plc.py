@@ -202,9 +202,11 @@ def test_message_of_a_plc2_and_a_plc3_writes_its_value_and_tells_that_it_is_conf
     ('1,PLC5,F8:1998,3,,,', '2:4 (Length): the last word there can be is F8:1999'),
     ('1,SLC,T4:255,4,,,', '2:4 (Length): the last word there can be is T4:255.ACC'),
     ('1,PLC5,N7:0,1,1 2,,', '2:5 (Values): 2 values, the mapping has 1'),
-    ('1,PLC5,N7:0,1,40000,,', '2:5 (Values): value 40000 at index 0 is not a valid int16'),
-    ('1,PLC5,N7:0,1,1.5,,', '2:5 (Values): value 1.5 at index 0 is not a valid int16'),
-    ('1,PLC5,B3:0/0,1,2,,', '2:5 (Values): value 2 at index 0 is not a valid bool'),
+    ('1,PLC5,N7:0,1,40000,,', '2:5 (Values): value 40000 at index 0 is not a valid int16, a whole '
+                              'number from -32768 to 32767'),
+    ('1,PLC5,N7:0,1,1.5,,', '2:5 (Values): value 1.5 at index 0 is not a valid int16, a whole '
+                            'number from -32768 to 32767'),
+    ('1,PLC5,B3:0/0,1,2,,', '2:5 (Values): value 2 at index 0 is not a valid bool, 0 or 1'),
     ('1,PLC5,ST9:0,1,' + 'x' * 83 + ',,', '2:5 (Values): 83 characters, a PLC string has 82'),
     ('1,PLC5,N7:0,1,,Jump,5', '2:6 (Motion): Motion = "Jump" should be one of Ramp, Toggle'),
     ('1,PLC5,N7:0,1,,Ramp,', '2:7 (Period): Period = "" should be a whole number from 1 to '

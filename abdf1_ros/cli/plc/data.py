@@ -299,20 +299,17 @@ def _number(mapping: Mapping, text: str) -> float:
     value: float | None
     if kind is not ValueType.FLOAT32:
         value = int(text, 0) if _WITH_BASE.fullmatch(text) else whole_number(text)
-        right = '0 or 1' if kind is ValueType.BOOL else \
-            f'a whole number from {low:.0f} to {high:.0f}'
     elif right := two_readings(text):
         raise FormatError(f'"{text}" could be two numbers; write {right}')
     else:
         value = decimal_number(text.replace(',', '.'))
-        right = 'a number such as -1.5 or 2e3'
     if value is None or not low <= value <= high:
         unsigned = _UNSIGNED.get(kind)
         hint = f'; --type {unsigned.value} allows it' if unsigned and value is not None and (
             high < value <= unsigned.range[1]) else ''
         if text in ('=', ':='):
             hint = '; the values follow the address without it'
-        raise FormatError(f'"{text}" is not a valid {kind.value}, {right}{hint}')
+        raise FormatError(f'"{text}" is not a valid {kind.value}, {kind.form}{hint}')
     return value
 
 

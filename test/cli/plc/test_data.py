@@ -152,7 +152,8 @@ def test_text_that_is_no_value_is_a_format_error(address: str, texts: list[str])
     ('N7:0', '65536', '"65536" is not a valid int16, a whole number from -32768 to 32767'),
     ('N7:0', '-32769', '"-32769" is not a valid int16, a whole number from -32768 to 32767'),
     ('B3:0/1', '2', '"2" is not a valid bool, 0 or 1'),
-    ('F8:0', '1_000', '"1_000" is not a valid float32, a number such as -1.5 or 2e3'),
+    ('F8:0', '1_000', '"1_000" is not a valid float32, a number such as -1.5 or 2e3, '
+                      'at most 3.4e38'),
     ('F8:0', '1,000', '"1,000" could be two numbers; write 1000 or 1.000')])
 def test_value_that_is_none_says_what_would_be_right(address: str, text: str, right: str) -> None:
     with pytest.raises(FormatError) as caught:
