@@ -98,7 +98,7 @@ class Handshake(Node):
     Requests jobs over the bridge ``bridge``.
 
     ``patience`` is the time (s) within which the bridge has to publish each topic again. A
-    publisher that has not done so is not alive.
+    publisher that has not done so is not alive. ``has_requested`` tells that a job may begin.
     """
 
     def __init__(self, bridge: str, control: str = '', patience: float = 2.0) -> None:
@@ -108,6 +108,7 @@ class Handshake(Node):
             depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL,
             liveliness=LivelinessPolicy.MANUAL_BY_TOPIC,
             liveliness_lease_duration=Duration(seconds=patience))
+        self.has_requested = False
         self._patience = patience
         self._crowd = ''  # which topic has had two living publishers
         self._state: tuple[int, int] | None = None
@@ -160,6 +161,7 @@ class Handshake(Node):
             print(f'not begun: the PLC is busy with job {self._state[0]}')
             return NOT_BEGUN
         number = next_number(*self._state)
+        self.has_requested = True
         print(f'job {number} requested', flush=True)
         step = self._request(number, begin_within, lambda step: step is not Step.WAITING)
         if step is Step.WAITING and not self._crowd:
@@ -277,8 +279,8 @@ def main() -> int:
     try:
         return node.run(options.begin_within, options.done_within)
     except KeyboardInterrupt:
-        print('unknown: interrupted')
-        return UNKNOWN
+        print('unknown: interrupted' if node.has_requested else 'not begun: interrupted')
+        return UNKNOWN if node.has_requested else NOT_BEGUN
     finally:
         node.destroy_node()
         rclpy.try_shutdown()

@@ -18,9 +18,11 @@ from collections.abc import Callable
 from pathlib import Path
 import re
 import runpy
+import signal
 import threading
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+import pytest
 from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile
 from std_msgs.msg import Int16MultiArray, UInt8MultiArray
@@ -29,6 +31,10 @@ from support.ros import Observer, Process
 
 EXAMPLE = Path(__file__).resolve().parents[2] / 'examples' / 'handshake.py'
 HANDSHAKE = runpy.run_path(str(EXAMPLE))
+
+STATES = QoSProfile(
+    depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL,
+    liveliness=LivelinessPolicy.MANUAL_BY_TOPIC, liveliness_lease_duration=Duration(seconds=1))
 
 Plc = Callable[[int, list[int]], None]
 """Is given a request and changes the words busy and done."""
@@ -45,15 +51,11 @@ def run(plc: Plc, state: list[int], *args: str, result: str = 'written',
     publishes: from the begin on, or from the first request on if it says that job 5 is done. An
     empty ``state`` is not published.
     """
-    lease = Duration(seconds=1)
-    latched = QoSProfile(
-        depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL, liveliness_lease_duration=lease,
-        liveliness=LivelinessPolicy.MANUAL_BY_TOPIC)
     requests: list[int] = []
     with Observer() as observer:
-        states = observer.node.create_publisher(Int16MultiArray, '/fake/read/job_state', latched)
+        states = observer.node.create_publisher(Int16MultiArray, '/fake/read/job_state', STATES)
         results = observer.node.create_publisher(DiagnosticStatus, '/fake/write_results', 10)
-        controls = observer.node.create_publisher(UInt8MultiArray, '/fake/read/control', latched)
+        controls = observer.node.create_publisher(UInt8MultiArray, '/fake/read/control', STATES)
         controls.publish(UInt8MultiArray(data=control or [1]))
 
         def publish() -> None:
@@ -63,7 +65,7 @@ def run(plc: Plc, state: list[int], *args: str, result: str = 'written',
                 stubs.publish(Int16MultiArray(data=stub))
 
         if stub is not None:
-            stubs = observer.node.create_publisher(Int16MultiArray, states.topic_name, latched)
+            stubs = observer.node.create_publisher(Int16MultiArray, states.topic_name, STATES)
         publish()
         observer.node.create_timer(0.1, publish)
 
@@ -144,6 +146,25 @@ def test_nothing_is_asked_for_while_ros_is_not_in_control() -> None:
     assert lines == ['not begun: ROS is not in control of the PLC. If /diagnostics says that the '
                      'heartbeat counts, a person has to press reset there; otherwise it says why '
                      'not']
+
+
+@pytest.mark.parametrize(('state', 'said'), [
+    ([], (1, ['not begun: interrupted'])),
+    ([4, 4], (3, ['job 5 requested', 'unknown: interrupted']))])
+def test_interrupt_tells_whether_a_job_may_begin(
+        state: list[int], said: tuple[int, list[str]]) -> None:
+    asked: list[Int16MultiArray] = []
+    with Observer() as observer:
+        states = observer.node.create_publisher(Int16MultiArray, '/fake/read/job_state', STATES)
+        if state:
+            states.publish(Int16MultiArray(data=state))
+        observer.node.create_subscription(
+            Int16MultiArray, '/fake/write/job_request', asked.append, 10)
+        with Process(EXAMPLE, '--node', '/fake', '--begin-within', '30') as example:
+            observer.until(lambda: asked if state else states.get_subscription_count(),
+                           'a request, or the example')
+            example.send(signal.SIGINT)
+            assert (example.result(), example.lines) == said
 
 
 def test_job_whose_control_is_lost_is_taken_back() -> None:
