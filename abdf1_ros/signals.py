@@ -27,7 +27,7 @@ import sys
 import threading
 import time
 from types import FrameType
-from typing import Self
+from typing import Self, TextIO
 from weakref import WeakSet
 
 # After a signal to end: longest wait of the output for its reader (s), and interval of the checks
@@ -120,6 +120,15 @@ def _is_stuck(descriptor: int) -> bool:
     """Tell whether a write would wait."""
     with suppress(OSError, ValueError):  # it is closed
         return not select.select([], [descriptor], [], 0)[1]
+    return False
+
+
+def has_no_reader(stream: TextIO) -> bool:
+    """Tell whether a stream is a pipe whose reader has left."""
+    with suppress(OSError, ValueError):  # it is closed, or not a file
+        state = select.poll()
+        state.register(stream.fileno(), 0)
+        return any(event & select.POLLERR for _, event in state.poll(0))
     return False
 
 

@@ -37,7 +37,7 @@ from abdf1_ros.numbers import decimal_number, whole_number
 from abdf1_ros.paths import as_called, expanded, ShowVersion
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.hints import pasted
-from abdf1_ros.signals import drop, limit_output
+from abdf1_ros.signals import drop, has_no_reader, limit_output
 from abdf1_ros.text import alike, printable
 
 RED, YELLOW, GREEN = 31, 33, 32
@@ -194,6 +194,12 @@ def has_reader_left(error: OSError, tell: Callable[[str], None]) -> bool:
         return True
     tell(reason_of(str(error.filename or 'cannot print'), error))
     return False
+
+
+def check_reader() -> None:
+    """Raise BrokenPipeError if the reader of standard output has left, also before a write."""
+    if has_no_reader(sys.stdout):
+        raise BrokenPipeError(errno.EPIPE, os.strerror(errno.EPIPE))
 
 
 _SETTINGS_AFTER = re.compile(r'/dev/[^:,@]+[:,@](\d{3,6})(?:[,:]\w+)*')  # as some programs have it

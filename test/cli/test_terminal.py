@@ -141,6 +141,16 @@ def test_messages_without_room_or_reader_do_not_end_the_work(
             say(progress)
 
 
+@pytest.mark.parametrize('place', [os.devnull, '/dev/full', 'file'])
+def test_output_without_a_reader_is_never_left(
+        place: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with open(tmp_path / place, 'w') as stdout:
+        monkeypatch.setattr('sys.stdout', stdout)
+        terminal.check_reader()
+    monkeypatch.setattr('sys.stdout', io.StringIO())
+    terminal.check_reader()
+
+
 def test_output_that_is_closed_takes_all(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr('sys.stdout', None)
     monkeypatch.setattr('sys.stderr', None)

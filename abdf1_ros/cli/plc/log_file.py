@@ -38,7 +38,7 @@ import stat
 import sys
 from typing import NamedTuple
 
-from abdf1_ros.cli.terminal import drop_output, reason_of
+from abdf1_ros.cli.terminal import check_reader, drop_output, reason_of
 from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.text import shown
 
@@ -211,6 +211,11 @@ class LogOutput(Log):
         if isinstance(sys.stdout, io.TextIOWrapper):
             sys.stdout.reconfigure(encoding='utf-8', errors='backslashreplace')
         self._is_continued = _is_our_output(form)
+
+    def write(self, rows: Iterable[LogRow]) -> None:
+        """Write rows; raises BrokenPipeError also without a row, as in a long gap."""
+        super().write(rows)
+        check_reader()
 
     def _put(self, text: str) -> None:
         try:

@@ -25,7 +25,7 @@ import textwrap
 
 from abdf1_ros.cli.plc.data import labels, Radix, rows, Tags, value_texts
 from abdf1_ros.cli.plc.reading import NoValue, RepeatedReads, WatchedRead
-from abdf1_ros.cli.terminal import is_terminal, table, tell
+from abdf1_ros.cli.terminal import check_reader, is_terminal, table, tell
 from abdf1_ros.pccc.values import Values
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
@@ -75,6 +75,7 @@ class LiveValues(RepeatedReads):
         if lost:
             tell('plc', lost_reads(lost))
         self._print(news)
+        check_reader()  # values that stay print nothing
 
     def _print(self, changed: Sequence[WatchedRead]) -> None:
         """Print the rows of each mapping that changed since the last call."""

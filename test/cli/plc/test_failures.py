@@ -175,6 +175,24 @@ def test_output_that_takes_nothing(tmp_path: Path, capsys: Output,
         each()
 
 
+def test_watch_of_a_value_that_stays_ends_with_its_reader(
+        tmp_path: Path, capsys: Output, monkeypatch: pytest.MonkeyPatch) -> None:
+    reader, writer = os.pipe()
+
+    def leave() -> None:
+        assert b'N7:0' in os.read(reader, 1000)
+        os.close(reader)
+
+    leaving = threading.Thread(target=leave)
+    leaving.start()
+    with odd_line(tmp_path / 'line', slc()) as name, open(writer, 'w') as output, \
+            monkeypatch.context() as here:
+        here.setattr(sys, 'stdout', output)
+        said = call(main, capsys, 'watch', 'N7:0', '--station', '2', '--port', name)
+    leaving.join()
+    assert (said.status, told(said)) == (0, [])
+
+
 @for_all(('text', 'name'), [
     ('read N7:0 --station 2 --record {}/line.cap', 'line.cap'),
     (VERBS['init'], 'net.csv'), ('import {}/list.csv --into {}', 'map.csv')])

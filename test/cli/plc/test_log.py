@@ -207,6 +207,17 @@ def plcs(tmp_path: Path) -> Iterator[Plcs]:
         yield line
 
 
+def test_log_without_a_new_row_ends_with_its_reader(monkeypatch: pytest.MonkeyPatch) -> None:
+    reader, writer = os.pipe()
+    with open(writer, 'w') as output:
+        monkeypatch.setattr(sys, 'stdout', output)
+        log = LogOutput(FORMS['csv'])
+        log.write([])
+        os.close(reader)
+        with pytest.raises(BrokenPipeError):
+            log.write([])
+
+
 class Kept(LogOutput):
     """Keep the rows."""
 
