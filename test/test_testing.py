@@ -15,11 +15,13 @@
 """The fixture for tests of cells: the whole example, and the test that its tutorial shows."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from itertools import count
 import os
 from pathlib import Path
 import re
+import signal
 import subprocess
 import sys
 import threading
@@ -208,6 +210,9 @@ def test_what_can_never_come_is_told_at_once(abdf1_cell: Cells) -> None:  # noqa
         abdf1_cell(data, rows.format(0), 'Mode\nPeer\n')
     with pytest.raises(LookupError, match='there is no station 3'):
         abdf1_cell(data, rows.format(0), ladders=[3])
+    for parameters in ({'write_timeout': 1.0}, 'write_timeout:=1.0', [1.0]):
+        with pytest.raises(ConfigurationError, match='^parameters: .* should be a list of texts'):
+            abdf1_cell(data, rows.format(0), parameters=parameters)
     cell = abdf1_cell(data, rows.format(0), parameters=['write_timeout:=1.0', 'net.baud:=7'])
     begun = time.monotonic()
     with pytest.raises(AssertionError, match='(?s)bridge has ended with 2.*Baud = "7"'):
@@ -216,6 +221,30 @@ def test_what_can_never_come_is_told_at_once(abdf1_cell: Cells) -> None:  # noqa
         cell.ros.until(lambda: False, 'a condition that is only false')
     assert cell.ros.until(lambda: 7, 'what is there though the bridge has ended') == 7
     assert time.monotonic() - begun < PATIENCE - 5.0
+    assert cell.end() == 2
+
+
+@pytest.mark.parametrize(('failure', 'told'), [
+    (None, 'the bridge has ended with 2.*stale_aftr'),
+    (AssertionError('its own failure'), '^its own failure$')])
+def test_bridge_that_has_ended_by_itself_fails_a_test_that_waits_for_nothing(
+        failure: Exception | None, told: str, tmp_path: Path) -> None:
+    cell = SimulatedCell(tmp_path, *SMALL, parameters=['stale_aftr:=2.0'])
+    with pytest.raises(AssertionError, match=f'(?s){told}'), cell:
+        with suppress(AssertionError):
+            cell.ros.until(lambda: False, 'the end of the bridge')
+        if failure:
+            raise failure
+    assert not cell.ros.context.ok()
+
+
+def test_end_of_the_bridge_by_the_test_is_told_when_nothing_comes(
+        abdf1_cell: Cells, monkeypatch: pytest.MonkeyPatch) -> None:  # noqa: F811
+    monkeypatch.setattr('abdf1_ros.testing.cell.PATIENCE', 0.2)
+    cell = abdf1_cell(*SMALL)
+    cell.end(signal.SIGKILL)
+    with pytest.raises(AssertionError, match='^waited for nine; the test has ended the bridge'):
+        cell.ros.until(lambda: False, 'nine')
 
 
 def test_node_of_the_test_needs_no_context(abdf1_cell: Cells) -> None:  # noqa: F811

@@ -114,6 +114,10 @@ class Bridge:
         if self.process is not None and (status := self.process.poll()) is not None:
             raise AssertionError(f'the bridge has ended with {status}{self.last_words()}')
 
+    def report(self) -> str:
+        """Return what to know of the bridge when something has not come."""
+        return ('' if self.process else '; the test has ended the bridge') + self.last_words()
+
     def last_words(self) -> str:
         """Return the last lines of the log."""
         lines = self.log.read_text(errors='replace').splitlines() if self.log.exists() else []
@@ -144,7 +148,7 @@ class Observer(observer.ObservingNode):
 
         if not (result := self.wait(is_over, PATIENCE)):
             raise AssertionError(f'waited for {what() if callable(what) else what}'
-                                 + (self._bridge.last_words() if self._bridge else ''))
+                                 + (self._bridge.report() if self._bridge else ''))
         return result
 
     def listen(self, message_type: type, topic: str, qos: QoSProfile | None = None) -> Messages:
@@ -192,7 +196,9 @@ class SimulatedCell:
     ``data``, ``rows`` and ``net`` are the texts of a simulator CSV, a map CSV and a net CSV, which
     go into ``folder``. ``ladders`` are stations with the program of docs/tutorials/heartbeats.md.
     ``parameters`` are the bridge's, as ``'write_timeout:=1.0'``; ``context`` is for ``ros`` and
-    nodes that are added to it. Raises ConfigurationError with every fault of net and map CSV.
+    nodes that are added to it. Raises ConfigurationError with every fault of net and map CSV, and
+    for parameters that are not such texts. The end raises AssertionError if the bridge has ended
+    by itself: otherwise a test that nothing comes would pass without a bridge.
     """
 
     observer: type[Observer] = Observer
@@ -203,6 +209,7 @@ class SimulatedCell:
                  context: Context | None = None) -> None:
         for name, text in (('data', data), ('map', rows), ('net', net)):
             (folder / f'{name}.csv').write_text(text, encoding='utf-8')
+        _check_parameters(parameters)
         net_file, map_file = str(folder / 'net.csv'), str(folder / 'map.csv')
         found = examine(net_file, map_file)
         line = found.network
@@ -227,8 +234,10 @@ class SimulatedCell:
             self._ends = stack.pop_all()
         return self
 
-    def __exit__(self, *exception: object) -> None:
-        self._ends.close()
+    def __exit__(self, kind: object, error: object, trace: object) -> None:
+        with self._ends:
+            if error is None:
+                self._bridge.check()
 
     def start(self) -> None:
         """Start the bridge, also again after its end."""
@@ -249,6 +258,13 @@ class SimulatedCell:
         while time.monotonic() < give_up and 'abdf1' in self.ros.node.get_node_names():
             time.sleep(0.005)
         return status
+
+
+def _check_parameters(parameters: object) -> None:
+    if not isinstance(parameters, list | tuple) or not all(
+            isinstance(text, str) for text in parameters):
+        raise ConfigurationError([Problem('parameters', (
+            f"{parameters!r} should be a list of texts, as in ['write_timeout:=1.0']"))])
 
 
 @contextmanager
