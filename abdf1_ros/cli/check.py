@@ -298,7 +298,8 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
     if options.map is None and options.heard:
         parser.error('--heard is for one line: give its net CSV and map CSV')
     if options.map is None and not os.path.isdir(options.net):
-        parser.error(f'{printable(options.net)} is not a folder, so a map CSV must follow')
+        parser.error(f'{printable(options.net)} is not a folder: give both files of a line, as in '
+                     '"check net.csv map.csv"')
     if options.html and options.map is None:
         parser.error('--html is for one net CSV and one map CSV')
     return options

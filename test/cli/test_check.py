@@ -291,8 +291,8 @@ def test_folder_without_lines_is_refused(tmp_path: Path, capsys: Output) -> None
 def test_one_file_is_not_enough(files: Paths, capsys: Output) -> None:
     write_csv(files[0], NET_HEADER, [GOOD_NET])
     net = str(files[0])
-    for args, told in (([net], f'{net} is not a folder, so a map CSV must follow'),
-                       (['long' * 99], 'longlong is not a folder, so a map'),
+    wanted = 'is not a folder: give both files of a line, as in "check net.csv map.csv"\n'
+    for args, told in (([net], f'{net} {wanted}'), (['long' * 99], f'longlong {wanted}'),
                        ([net, '--heard', 'x.cap'], '--heard is for one line')):
         with pytest.raises(SystemExit):
             main(args)

@@ -309,6 +309,8 @@ def _number(mapping: Mapping, text: str) -> float:
             high < value <= unsigned.range[1]) else ''
         if text in ('=', ':='):
             hint = '; the values follow the address without it'
+        elif looks_like_address(text.partition('=')[0]):
+            hint = '; a write has one address, and the values of the places after it follow'
         raise FormatError(f'"{text}" is not a valid {kind.value}, {kind.form}{hint}')
     return value
 
