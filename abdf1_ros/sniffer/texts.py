@@ -57,12 +57,22 @@ _MOST_JUDGED = 16_384  # bytes
 _ENOUGH = 0.5  # share of good bytes with which less likely notations are not tried
 _SURE = 0.999
 _CHANCE = 0.05  # share of good bytes that noise may have
+_LATER = 50  # lines after one that does not fit, which show whether the reading is right
 _MANY = 32  # bytes that prove a notation although no frame is good
 
 _PACKETS = ('this shows whole packets with their IP headers, not the bytes of a line: record with '
             '"tshark -w" or "tcpdump -w", and give that file; text2pcap makes such a file from '
             'the text of "tshark -x"')
 
+# A line of usbmon as text: tag, time, submission or completion, and the endpoint.
+_USBMON = re.compile(r'[0-9a-f]{8,16} \d+ [SCE] [BCIZ][io]:\d+:\d+')
+_USB = ('usbmon as text shows at most 32 bytes of each packet: record with "tcpdump -i usbmon1 '
+        '-w" or Wireshark, and give that file')
+_PUTTY = ('a log of PuTTY: its "printable output" lacks the control characters of DF1, such as '
+          'DLE; let it log "all session output" and add --binary, or record with "sniff --port"')
+
+_SHOWN = 60  # characters of a line
+_HALF = re.compile(r'(?<!\w)[0-9A-Fa-f]{2}\s[0-9A-Fa-f]\Z')  # at the end of a line
 _COMMENT = re.compile(r'#(?!\d)|//')
 
 
@@ -179,11 +189,21 @@ class TextProblem(Problem):
 
 
 class _Stop(Exception):
-    """The number and the text of a line that does not fit, and the reason if there is one."""
+    """
+    The number and the text of a line that does not fit, and the reason if there is one.
 
-    def __init__(self, number: int, line: str, reason: str = '') -> None:
+    ``others``: how many other lines are read as bytes. A reading that reads many of them knows
+    best which line is wrong.
+    """
+
+    def __init__(self, number: int, line: str, reason: str = '', others: int = 0) -> None:
         super().__init__(number, line, reason)
-        self.number, self.line, self.reason = number, line, reason
+        self.number, self.line, self.reason, self.others = number, line, reason, others
+
+    @property
+    def rank(self) -> tuple[bool, int, int]:
+        """Return what tells the likeliest of several stops; the greatest counts."""
+        return self.reason != '', self.others, self.number
 
     def problem(self, name: str) -> TextProblem:
         if self.reason:
@@ -191,8 +211,13 @@ class _Stop(Exception):
         elif is_cut(self.line):
             text = 'the bytes are cut here; let the program that wrote this show whole lines'
         else:
-            text = (f'"{self.line.strip()[:60]}" does not fit: write bytes as in 10 05 01 FF, '
-                    'after a direction such as TX or RX, or give --binary for a file of raw bytes')
+            line = self.line.strip()
+            line = line if len(line) <= _SHOWN else f'{line[:_SHOWN - 25]} ... {line[-20:]}'
+            right = 'its last byte has one digit; leave it out, or write 04 for 4' \
+                if _HALF.search(line) else (
+                    'write bytes as in 10 05 01 FF, after a direction such as TX or RX, or give '
+                    '--binary for a file of raw bytes')
+            text = f'"{line}" does not fit: {right}'
         return TextProblem(f'{name}:{self.number}', text)
 
 
@@ -219,8 +244,8 @@ class TextReader:
                 break
         if not any(line.strip() for _, line in sample):
             return
-        if shows_packets(line for _, line in sample):
-            raise TextProblem(self._name, _PACKETS)
+        if reason := _refused([line for _, line in sample]):
+            raise TextProblem(self._name, reason)
         try:
             best = _best([(number, _begin(line)) for number, line in sample])
         except _Stop as stop:
@@ -237,6 +262,15 @@ class TextReader:
                 yield chunk
         except _Stop as stop:
             raise stop.problem(self._name) from None
+
+
+def _refused(lines: Sequence[str]) -> str:
+    """Return why a text of a known program lacks bytes of the line; empty for any other text."""
+    if any(map(_USBMON.match, lines)):
+        return _USB
+    if lines[0].startswith('=~=') and 'PuTTY log' in lines[0]:
+        return _PUTTY
+    return _PACKETS if shows_packets(lines) else ''
 
 
 def _begin(line: str) -> str:
@@ -261,7 +295,7 @@ def _best(sample: Sequence[tuple[int, str]]) -> _TextReading | None:
                     if best is None or reading.score > best.score:
                         best = reading
             except _Stop as failed:
-                if stop is None or failed.number > stop.number:
+                if stop is None or failed.rank > stop.rank:
                     stop = failed
             if best is not None and best.share > _SURE and best.marks.has_both:
                 return best
@@ -299,11 +333,13 @@ def _tried(layout: TextLayout, sample: Sequence[tuple[int, str]]) -> Iterator[_T
     """Yield the readings of a sample with a layout, judged; raise _Stop if it does not fit."""
     trial = _TextReading(layout)
     said: list[tuple[int, list[Piece]]] = []
-    for number, line in sample:
+    for at, (number, line) in enumerate(sample):
         try:
             said.append((number, trial.pieces(line)))
         except ValueError as error:
-            raise _Stop(number, line, str(error) if isinstance(error, Unfit) else '') from None
+            later = sum(_has_bytes(trial, line) for _, line in sample[at + 1:at + _LATER])
+            raise _Stop(number, line, str(error) if isinstance(error, Unfit) else '',
+                        _with_bytes(said) + later) from None
     learnt = layout.again()
     if learnt is None or not any(piece.data for _, pieces in said for piece in pieces):
         return
@@ -313,12 +349,24 @@ def _tried(layout: TextLayout, sample: Sequence[tuple[int, str]]) -> Iterator[_T
             reading = _judged(layout, said, sample, texts)
         except _Stop as failed:
             stop = failed
+            stop.others = _with_bytes(said)
         else:
             if reading is not None:
                 layout.is_fit = True
                 yield reading
     if stop is not None:
         raise stop
+
+
+def _has_bytes(reading: _TextReading, line: str) -> bool:
+    try:
+        return any(piece.data for piece in reading.pieces(line))
+    except ValueError:
+        return False
+
+
+def _with_bytes(said: Sequence[tuple[int, list[Piece]]]) -> int:
+    return sum(any(piece.data for piece in each) for _, each in said)
 
 
 def _texts(said: Sequence[tuple[int, list[Piece]]]) -> Iterator[frozenset[str]]:
@@ -373,7 +421,7 @@ def _judged(layout: TextLayout, said: Sequence[tuple[int, list[Piece]]],
 def _is_likely(reading: _TextReading, said: Sequence[tuple[int, list[Piece]]]) -> bool:
     """Return True if a text without good frames has bytes all the same."""
     layout, marks = reading.layout, reading.marks
-    left, read = _numbered(said), sum(any(piece.data for piece in each) for _, each in said)
+    left, read = _numbered(said), _with_bytes(said)
     unknown = [kind for kind, way in marks.ways.items() if way is Direction.UNKNOWN]
     if left > read or len(unknown) > 2 or not layout.is_sure:
         return False

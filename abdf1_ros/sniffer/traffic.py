@@ -250,11 +250,13 @@ class TrafficDecoder:
         text = frame.fault.value
         if frame.fault is not FrameFault.BAD_CHECK:
             return Entry(time, direction, Kind.DAMAGED, text, station)
-        text += f': {frame.received:04X}, right is {frame.expected:04X}'
-        packet = None
-        if len(frame.data) >= HEADER_SIZE:
-            packet = Packet.decode(frame.data)
-            text += f'; reads like {_route(packet)}'
+        packet = Packet.decode(frame.data) if len(frame.data) >= HEADER_SIZE else None
+        likeness = f'; reads like {_route(packet)}' if packet else ''
+        if frame.has_stopped:
+            return Entry(time, direction, Kind.DAMAGED,
+                         f'broken off before the end of its check{likeness}', station,
+                         packet=packet)
+        text += f': {frame.received:04X}, right is {frame.expected:04X}{likeness}'
         return Entry(time, direction, Kind.DAMAGED, text, station, checksum, False, packet)
 
     def _node(self, station: int | None, packet: Packet) -> int:

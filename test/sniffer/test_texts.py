@@ -112,7 +112,33 @@ def test_all_that_is_left_out_in_a_file_is_no_more_than_in_one_place() -> None:
         read([*lines, f'{120_000_000:08x}: {row}'])
 
 
-@for_all('line', ['10 5', '10 05 and more', '*', '1 2 3 10 06', '00000000: 1x'])
+@for_all('bad', [0, 2])
+def test_line_with_half_a_byte_is_named_and_no_good_line_after_it(bad: int) -> None:
+    cut = '14:03:05,123 TX 10 02 01 05 0F 00 A4 0E 68 00 00 01 00 07 00 42 10 03 4'
+    lines = ['14:03:05,223 RX 10 06', '14:03:05,323 TX 10 05', '14:03:05,423 RX 10 06']
+    lines.insert(bad, cut)
+    with pytest.raises(Problem, match=(
+            f'x:{bad + 1}: "14:03:05,.* 4" does not fit: its last byte has one digit; leave it '
+            'out, or write 04 for 4')) as caught:
+        read(lines)
+    assert len(str(caught.value)) < 150
+
+
+@for_all(('lines', 'told'), [
+    (['ffff9c4a1 3575914555 S Bo:1:004:2 -115 14 = 10020105 0f00a40e 68000001 1003',
+      'ffff9c4a1 3575914855 C Bo:1:004:2 0 14 >',
+      'ffff9c4a2 3575924555 C Bi:1:004:1 0 4 = 01601006'],
+     'x: usbmon as text shows at most 32 bytes of each packet: record with "tcpdump -i usbmon1'),
+    (['d5ea89a0 3575914555 S Bi:004:01 -115 64 <'], 'x: usbmon as text'),
+    (['=~=~=~=~=~=~= PuTTY log 2026.03.01 14:05:09 =~=~=~=~=~=~=', '10 06'],
+     'x: a log of PuTTY: its "printable output" lacks the control characters of DF1')])
+def test_log_without_all_bytes_is_refused_by_its_program(lines: list[str], told: str) -> None:
+    with pytest.raises(Problem) as caught:
+        read(lines)
+    assert str(caught.value).startswith(told)
+
+
+@for_all('line', ['10 05 and more', '*', '1 2 3 10 06', '00000000: 1x'])
 def test_bad_line_is_named(line: str) -> None:
     with pytest.raises(Problem, match='does not fit: write bytes as in 10 05 01 FF') as caught:
         joined(['10 04', line])

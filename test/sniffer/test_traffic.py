@@ -180,7 +180,7 @@ def test_full_duplex_traffic_is_told_in_both_directions() -> None:
     (('10 06 10 02 01 00 0F 00 FB 6F A3 FF A8 4F FF AC 51 FF AE 51 FF 9C 4F FF 94 51 FF 96 51 10 '
       '03 4B', '10 06 10 02 00 01 4F 00 FB 6F 00 00 00 00 00 00 00 FF FF 00 00 00 00 00 00 00 '
       'FF FF 10 03 BE 07'),
-     ['', '', '1 to 0, TNS 6FFB: ', 'wrong check: 004B, right is 014B; reads like 0 to 1'])])
+     ['', '', '1 to 0, TNS 6FFB: ', 'broken off before the end of its check; reads like 0 to 1'])])
 def test_frames_of_real_processors(said: tuple[str, ...], told: list[str]) -> None:
     entries = decode(zip((OUT, IN), map(bytes.fromhex, said)), TrafficDecoder(Checksum.CRC))
     assert all(entry.text.startswith(text) for entry, text in zip(entries, told, strict=True))
@@ -200,6 +200,12 @@ def test_frame_that_breaks_off_does_not_swallow_what_comes_after_a_pause() -> No
     assert (last.time, last.kind, last.station, last.text, last.wire) == (
         0.0, Kind.DAMAGED, 1, 'broken off before DLE ETX', said[0][1])
     assert kinds(decode(said, pause=0.1)) == [Kind.DAMAGED, Kind.SILENCE, Kind.POLL]
+    for check in (b'', b'\x12'):
+        whole = message(COMMAND)[:-2] + check
+        last, = decode([(OUT, whole)], TrafficDecoder(Checksum.CRC))
+        assert (last.kind, last.text, last.valid, last.wire) == (
+            Kind.DAMAGED, 'broken off before the end of its check; reads like 5 to 1, TNS 1234',
+            None, whole)
     assert kinds(decode([(OUT, b'\x10'), said[1]], pause=-1.0)) == [
         Kind.NOISE, Kind.POLL]
 

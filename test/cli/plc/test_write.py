@@ -199,10 +199,9 @@ def test_write_that_does_not_fit_the_family_of_the_plc(plc: Plc) -> None:
                               'give its map with --map FILE'),
     (('write', 'N7:0', '=', '5'), 'N7:0: "=" is not a valid int16, a whole number from -32768 to '
      '32767; the values follow the address without it'),
-    (('write', 'N7:0=1000', 'N7:1=2'), 'N7:0: "N7:1=2" is not a valid int16, a whole number from '
-     '-32768 to 32767; a write has one address, and the values of the places after it follow'),
-    (('write', 'N7:0', '5', 'N7:1'), '32767; a write has one address, and the values of the places '
-                                     'after it follow'),
+    (('write', 'N7:0', '1000', 'N7:1=2'),
+     'N7:0: "N7:1=2" is not a valid int16, a whole number from -32768 to 32767; a write has one '
+     'address, and the values of the places after it follow'),
     (('write', 'B3:0/1=on'), 'B3:0/1: "on" is not a valid bool, 0 or 1'),
     (('read', 'N7:0', 'B3:O'), 'ADDRESS "B3:O": that is the letter O where a digit should be; '
                                'write B3:0'),
