@@ -265,7 +265,7 @@ class Client(BlockingClient):
     @contextmanager
     def _naming(self, place: str, asks: bool = True) -> Iterator[None]:
         """Add ``place`` to errors of the block, and let them speak of a call, not of a row."""
-        with self._line.naming(place, asks):
+        with super()._naming(place, asks):
             try:
                 yield
             except (FormatError, RemoteError) as error:

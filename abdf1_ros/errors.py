@@ -143,6 +143,9 @@ class CommandExpired(LinkError):
 INTERNAL_ERROR = 'internal error, see the log'  # the reason if a bug ends the use of the port
 
 
+CLOSED = 'closed by this program'
+
+
 class PortLost(LinkError):
     """The port failed or was closed while the transaction ran; the argument says how."""
 

@@ -93,7 +93,15 @@ def whole(low: int, high: int, unit: str = '') -> ValueKind[int]:
     def read(text: str) -> int | None:
         value = whole_number(text)
         return value if value is not None and low <= value <= high else None
-    return ValueKind(read, f'a whole number from {low} to {high} {unit}'.rstrip(), low, high)
+
+    right = f'a whole number from {low} to {high} {unit}'.rstrip()
+
+    def why_not(text: str) -> str:
+        """Tell of 8.0, which pandas makes of 8 in a column with empty cells."""
+        before, _, after = text.partition('.')
+        return f'should be {right}: {before}' if after and not after.strip('0') and \
+            read(before) is not None else ''
+    return ValueKind(read, right, low, high, why_not=why_not)
 
 
 def one_of(known: Mapping[str, _T], spelled: Callable[[str], object] = str.lower) -> ValueKind[_T]:

@@ -39,7 +39,13 @@ from abdf1_ros.df1.packet import is_local_status
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.requests import Requests
-from abdf1_ros.errors import Abdf1Error, FormatError, PortLost, RemoteError
+from abdf1_ros.errors import (
+    Abdf1Error,
+    FormatError,
+    PortLost,
+    RemoteError,
+    StationInactive,
+)
 from abdf1_ros.messages import Event, Severity
 from abdf1_ros.pccc.dialect import Steps
 from abdf1_ros.pccc.file_types import PlcType
@@ -220,7 +226,7 @@ class OpenLine(_Closes):
                 'values, "sniff" its traffic'))])
         self.log = logger_of(logger)
         self._process = os.getpid()
-        self.port_name = port.name
+        self.port_name, self._port_settings = port.name, port
         self._entries: deque[_Entry] = deque()
         self._lost = self._lost_reported = 0  # entries
         self._mode, self._settings = mode, line
@@ -305,6 +311,18 @@ class OpenLine(_Closes):
         self._holder.end.succeed(None)
 
     @property
+    def unheard(self) -> str:
+        """Return the settings as a remark if nothing that fits has come, or else nothing."""
+        counts = self.counters
+        if counts.messages_received or counts.acks_received or counts.naks_received \
+                or counts.eots_received:
+            return ''
+        port = self._port_settings
+        return (f'; nothing that fits has come in {self._mode.duplex.value} at '
+                f'{port.baud} baud, parity {port.parity}, check {self._settings.checksum.value}: '
+                '"plc detect" finds the settings of a line')
+
+    @property
     def line_model(self) -> LineModel:
         """Return the model of the times of transactions on this line."""
         from abdf1_ros.plan.line_model import LineModel  # only a plan needs it
@@ -355,6 +373,16 @@ class BlockingClient(_Closes):
 
     def __init__(self, line: OpenLine) -> None:
         self._line = line
+
+    @contextmanager
+    def _naming(self, place: str, asks: bool = True) -> Iterator[None]:
+        """Add ``place`` to errors of the block, and the settings while nothing fits them."""
+        with self._line.naming(place, asks):
+            try:
+                yield
+            except StationInactive as error:
+                error.done = self._line.unheard
+                raise
 
     if not TYPE_CHECKING:  # with it mypy would let all names pass
 
@@ -479,5 +507,6 @@ def path_of(name: str, value: object) -> str:
 
 def text_of(name: str, value: object) -> str:
     if not isinstance(value, str) or not value:
-        raise FormatError(f'{name} {shown(repr(value))} should be a text')
+        end = ', and is empty' if value == '' else ''
+        raise FormatError(f'{name} {shown(repr(value))} should be a text{end}')
     return value

@@ -108,17 +108,17 @@ class TaggedClient(BlockingClient):
             return self._readings([tag] if isinstance(tag, str) else tag)
         if isinstance(tag, str) or not isinstance(tag, Iterable):
             row = self._row(tag, 'read')
-            with self._line.naming(_named(row)):
+            with self._naming(_named(row)):
                 return _shown(row, self._line.ask(row.station, steps.read(row.target)))
         rows = [self._read_once(name) for name in dict.fromkeys(tag)]
-        with self._line.naming(first([row.tag for row in rows])):
+        with self._naming(first([row.tag for row in rows])):
             values = values_of_rows(self._line, rows)
         return {row.tag: _shown(row, values[row]) for row in rows}
 
     def write(self, tag: str, values: float | str | Sequence[float]) -> None:
         """Write to a Write or ReadWrite row; return when the PLC has confirmed all values."""
         row = self._row(tag, 'written')
-        with self._line.naming(_named(row)):
+        with self._naming(_named(row)):
             self._line.ask(row.station, steps.write(
                 row.target, raw_values(row, values_of(values))))
 
@@ -130,7 +130,7 @@ class TaggedClient(BlockingClient):
                 rows.append(self._read_once(name))
             except FormatError as error:
                 found[name] = Reading.failed(error)
-        with self._line.naming(first([*names])):
+        with self._naming(first([*names])):
             found |= readings_of_rows(self._line, rows, _named, _shown)
         return {name: found[name] for name in names}
 

@@ -154,9 +154,18 @@ class InterlockConsumer(Node):
     def _silent(self) -> None:
         self._silence.cancel()  # until the next value
         if self._text == 'no value yet':
-            self._decide(False, 'nothing heard since the start')
+            self._decide(False, f'nothing heard since the start{self._why_nothing()}')
         elif self._is_fresh:
             self._stopped()
+
+    def _why_nothing(self) -> str:
+        """Return what the publishers of the topic show of the reason, empty if nothing."""
+        topic = self._subscription.topic_name
+        types = {found.topic_type for found in self.get_publishers_info_by_topic(topic)}
+        if not types:
+            return f': no node publishes {topic}'
+        wrong = types - {'std_msgs/msg/UInt8MultiArray'}
+        return f': {topic} has no bits, but {", ".join(sorted(wrong))}' if wrong else ''
 
     def reset(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """

@@ -15,9 +15,10 @@
 """
 Log all rows of a map into SQLite, every second, until Ctrl-C, SIGTERM or --seconds. Without ROS.
 
-The table ``readings`` has time (s since 1970), tag, value and error. A list is JSON. A row without
-value is the beginning of a gap, and ``error`` its reason; the gap ends with the next value of the
-tag. A PLC that is silent or an adapter that is unplugged costs only its own values.
+The table ``readings`` has time (s since 1970), tag, value and error. A list is JSON. NaN and
+infinity are the texts nan, inf and -inf. A row without value is the beginning of a gap, and
+``error`` its reason; the gap ends with the next value of the tag. A PLC that is silent or an
+adapter that is unplugged costs only its own values.
 
 Exit status: 0 at the end, 1 if the database cannot be written, 2 if files or port are wrong.
 """
@@ -35,7 +36,7 @@ import sys
 import time
 
 from abdf1_ros import Client, Reading
-from abdf1_ros.problems import ConfigurationError
+from abdf1_ros.problems import ConfigurationError, Problem
 
 _TABLE = 'CREATE TABLE IF NOT EXISTS readings (time REAL, tag TEXT, value, error TEXT)'
 
@@ -48,14 +49,20 @@ examples:
 """
 
 
+def stored(value: object) -> object:
+    """Return what SQLite and JSON can hold of a value."""
+    if isinstance(value, list):
+        return json.dumps([stored(each) for each in value])
+    return str(value) if isinstance(value, float) and not math.isfinite(value) else value
+
+
 def rows_of(readings: dict[str, Reading],
             gaps: dict[str, str]) -> Iterator[tuple[float, str, object, str | None]]:
     """Yield the rows of one round; ``gaps`` has the reason of each tag without a value."""
     for tag, reading in readings.items():
         if reading.error is None:
             gaps.pop(tag, None)
-            value = reading.value
-            yield reading.time, tag, json.dumps(value) if isinstance(value, list) else value, None
+            yield reading.time, tag, stored(reading.value), None
         elif gaps.get(tag) != str(reading.error):
             gaps[tag] = str(reading.error)
             yield reading.time, tag, None, gaps[tag]
@@ -66,6 +73,8 @@ def log(options: argparse.Namespace) -> None:
     gaps: dict[str, str] = {}
     with closing(sqlite3.connect(options.database)) as base, \
             Client.from_files(options.net_file, options.map_file) as plant:
+        if not plant.tags:
+            raise ConfigurationError([Problem(options.map_file, 'no row reads: nothing to log')])
         base.execute('PRAGMA journal_mode = WAL')  # others may read meanwhile
         base.execute(_TABLE)
         due = time.monotonic()

@@ -158,7 +158,7 @@ def main() -> int:
 def run(options: argparse.Namespace, file: TextIO, ended: list[int]) -> int:
     """Record into ``file``; return the exit status."""
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    node = Recorder(options.node, file)
+    node = Recorder(f'/{options.node.lstrip("/")}', file)
     try:
         found = record(node, options.seconds, options.wait, ended)
     finally:

@@ -46,7 +46,7 @@ from abdf1_ros.df1.peer import PEER
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import TaskSource
-from abdf1_ros.errors import FormatError, LinkError, PortLost, RemoteError
+from abdf1_ros.errors import FormatError, LinkError, PortLost, RemoteError, StationInactive
 from abdf1_ros.open_line import kind_of, LOG, OpenLine, Pending
 from abdf1_ros.pccc.identity import Identity, Mode
 from abdf1_ros.pccc.steps import identify
@@ -225,13 +225,25 @@ def test_silent_plc_is_asked_once_for_all_that_is_wanted_of_it(
                 retries=2) as plc:
         for polls in 0, 1:  # after its retries a silent station gets one poll for each call
             found = plc.read_many(['N7:0', 'F8:0', 'B3:0'], partial=True)
-            assert [str(reading.error) for reading in found.values()] == [
+            assert [str(reading.error).partition(';')[0] for reading in found.values()] == [
                 f'{text} of station 9: 2509 ERR_INACTIVE_STATION: Slave Station (9) Inactive'
                 for text in ('N7:0', 'F8:0', 'B3:0')]
             assert (plc.counters.messages_sent, plc.counters.polls_sent) == (3, polls)
             sent = [reading.error.sent for reading in found.values()
                     if isinstance(reading.error, LinkError)]
             assert sent == [plc_type is not None and not polls, False, False]
+
+
+def test_settings_are_named_while_nothing_fits_them(port: str) -> None:
+    with Client(port, baud=115200, timeout=0.05, retries=0) as wrong, \
+            pytest.raises(StationInactive, match=(
+                'nothing that fits has come in full duplex at 115200 baud, parity None, check '
+                'CRC: "plc detect" finds the settings of a line$')):
+        wrong.read('N7:0')
+    with Client(port, duplex='half', baud=115200, timeout=0.05, retries=0) as right:
+        right.read('N7:0')
+        with pytest.raises(StationInactive, match=r'\(9\) Inactive$'):
+            right.read('N7:0', station=9)
 
 
 def test_retries_trace_and_log_are_arguments(port: str, tmp_path: Path,
@@ -300,7 +312,7 @@ def test_entries_of_the_log_that_nothing_takes_are_counted(
 
 @for_all(('address', 'arguments', 'text'), [
     ('N7', {}, 'an element is missing, as in N7:0'),
-    ('F8:0', {'length': 300}, '300 elements do not fit at F8:0; .* F8:255$'),
+    ('F8:0', {'length': 300}, r'300 float32 \(600 words\) do not fit at F8:0; .* F8:255$'),
     ('N7:0', {'length': 0}, '^length 0 should be a whole number from 1 on$'),
     ('N7:0-2', {}, '^N7:0-2 of station 1: write N7:0, length=3$'),
     ('B3:0/0-B3:1/3', {}, 'bits of several words; write B3:0/0, length=20$'),

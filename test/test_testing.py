@@ -31,6 +31,7 @@ from unittest.mock import Mock
 
 from abdf1_ros.client import Client
 from abdf1_ros.df1 import frames
+from abdf1_ros.pccc.data_table import OutOfRange
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.ros import observer
 from abdf1_ros.ros.topics.messages import latched_qos
@@ -155,6 +156,24 @@ def test_fixture_takes_no_word_for_what_is_none(
         call(plcs)
     with plcs.client() as plc:
         assert plc.read('N7:0') == 0
+
+
+def test_mistaken_arguments_of_fixture_and_client_are_named(
+        abdf1_plcs: Callable[..., Plcs], tmp_path: Path) -> None:  # noqa: F811
+    for path in (tmp_path / 'data.csv', 'data.csv'):
+        with pytest.raises(ValueError, match=r'data.csv.* should be the text of a simulator CSV'):
+            abdf1_plcs(path)
+    plcs = abdf1_plcs('Station,PLC_Type,Address,Length\n1,SLC,N7:0,4\n')
+    with pytest.raises(TypeError, match='^baud, duplex: the simulated line decides that$'):
+        plcs.client(duplex='full', baud=9600)
+    with pytest.raises(OutOfRange, match='^1 word at N7:99 would end after the file, which has 4'):
+        plcs.set('N7:99', 1)
+    (tmp_path / 'data.csv').write_text('Station,PLC_Type,Address\n1,SLC,N7:0\n')
+    idle = Plcs(tmp_path / 'data.csv')
+    with pytest.raises(RuntimeError, match=r'use "with Plcs\(...\) as plcs:"'):
+        idle.client()
+    with idle:
+        idle.client(plc_type='SLC').close()
 
 
 @pytest.mark.parametrize('station', ['1', 1.0])

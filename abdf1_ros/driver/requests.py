@@ -33,7 +33,7 @@ from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task, TaskSource
 from abdf1_ros.driver.inbox import Inbox
 from abdf1_ros.driver.job_tasks import Job, JobTasks
-from abdf1_ros.errors import INTERNAL_ERROR, LinkError, PortLost
+from abdf1_ros.errors import CLOSED, INTERNAL_ERROR, LinkError, PortLost
 from abdf1_ros.messages import Event, Message
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.describe import effect_of
@@ -143,7 +143,7 @@ class Requests(TaskSource):
 
     def close(self) -> None:
         """Refuse all requests, waiting and new ones; to be called when the link has ended."""
-        self._end(PortLost('closed by this program'))
+        self._end(PortLost(CLOSED))
 
     def next_task(self, now: float, busy: Container[int] = ()) -> Task | None:
         """Return the next command of the request under way, or of the next request."""

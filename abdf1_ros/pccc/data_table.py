@@ -21,6 +21,7 @@ from collections.abc import Iterator
 from abdf1_ros.errors import Abdf1Error
 from abdf1_ros.pccc.address import Address, Area
 from abdf1_ros.pccc.file_types import FileType, PlcType
+from abdf1_ros.text import counted
 
 
 class NoSuchFile(Abdf1Error):
@@ -100,5 +101,7 @@ class DataTable:
             raise NoSuchFile(f'there is no {address}')
         start = 2 * address.offset
         if start + 2 * words > len(store):
-            raise OutOfRange(f'{words} words at {address} end after the file')
+            has = counted(len(store) // 2, 'word')
+            raise OutOfRange(f'{counted(words, "word")} at {address} would end after the file, '
+                             f'which has {has}')
         return store, start

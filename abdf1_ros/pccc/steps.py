@@ -32,6 +32,7 @@ from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.status import check_status, is_address_fault, STS_ILLEGAL_COMMAND
 from abdf1_ros.pccc.structures import bits_fault, order_fault, type_fault, write_fault, wrong_type
 from abdf1_ros.pccc.values import Codec, types_of, Values, ValueType, WordOrder
+from abdf1_ros.text import counted
 
 # From reports of libplctag's users about an SLC 5/05 and MicroLogix (its issues 121, 479 and 657).
 _PERHAPS_FLAT = ('some SLC and MicroLogix have inputs and outputs with Access Flat only, by the '
@@ -67,8 +68,10 @@ class AddressedValues:
             raise FormatError('each string needs its own call, with length 1')
         if length < 1 or address.offset + codec.words > address.area_size:
             last = address.last_of_area
-            raise FormatError(f'{length} elements do not fit at {address}; the last word there '
-                              f'can be is {last}')
+            what = counted(length, 'element') if kind.words < 2 else \
+                f'{length} {kind.value} ({counted(codec.words, "word")})'
+            raise FormatError(f'{what} {"does" if length == 1 else "do"} not fit at {address}; '
+                              f'the last word there can be is {last}')
         if fault := bits_fault(address, kind, length) or type_fault(address, kind, length):
             raise FormatError(fault)
         return cls(address, codec, dialect_of(plc_type, access, processor))

@@ -23,7 +23,7 @@ import threading
 import time
 
 from abdf1_ros.df1.machine import Machine
-from abdf1_ros.errors import INTERNAL_ERROR, PortLost
+from abdf1_ros.errors import CLOSED, INTERNAL_ERROR, PortLost
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.descriptor import NoClient, Port, READ_SIZE
 from abdf1_ros.ports.pace import Pace
@@ -244,7 +244,7 @@ class LinkThread(PortThread):
     def _run_on(self, port: Port) -> bool:
         """Run machines until the port has to be closed; return False if it was lost."""
         self._set_state(True, 'open')
-        end = 'the driver is stopping'
+        end = CLOSED
         try:
             while not self._is_interrupted:
                 self._exchange(keeps_port=True)

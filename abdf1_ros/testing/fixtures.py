@@ -46,6 +46,9 @@ def abdf1_plcs(tmp_path: Path) -> Iterator[Callable[..., Plcs]]:
     numbers = count(1)
     with ExitStack() as stack:
         def made(data: str, ladders: Sequence[int] = ()) -> Plcs:
+            if not isinstance(data, str) or '\n' not in data:
+                raise ValueError(f'{data!r} should be the text of a simulator CSV, with its first '
+                                 'row; Plcs takes the path of a file')
             folder = tmp_path / f'line{next(numbers)}'
             folder.mkdir()
             (folder / 'data.csv').write_text(data, encoding='utf-8')

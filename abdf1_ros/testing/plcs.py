@@ -80,6 +80,11 @@ class Plcs:
 
     def client(self, **arguments: Any) -> Client:
         """Return a client on the line, with further ``arguments``; ``with`` closes it."""
+        if not self.link.is_alive():
+            raise RuntimeError('the simulated line has not begun, or has ended: use '
+                               '"with Plcs(...) as plcs:"')
+        if given := {'port', 'duplex', 'baud'}.intersection(arguments):
+            raise TypeError(f'{", ".join(sorted(given))}: the simulated line decides that')
         return Client(self.port, duplex='half', baud=_BAUD, **arguments)
 
     def files(self, rows: str) -> tuple[Path, Path]:

@@ -25,6 +25,7 @@ import sys
 from unittest.mock import Mock
 
 from abdf1_ros.cli import terminal
+from abdf1_ros.cli.plc.command import main as plc_main
 from abdf1_ros.errors import PortLost
 from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings.network import load_network
@@ -159,6 +160,14 @@ def test_output_that_is_closed_takes_all(monkeypatch: pytest.MonkeyPatch) -> Non
         print('text', file=stream, flush=True)
         assert not terminal.is_terminal(stream)
         stream.close()
+
+
+def test_plc_says_that_its_output_is_closed(
+        monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr('sys.stdout', None)
+    assert plc_main(['ports']) == 0
+    assert capsys.readouterr().err == (
+        'plc: standard output is closed, so nothing that it prints can be seen\n')
 
 
 def test_output_that_knows_few_characters_shows_escapes(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,14 +15,18 @@
 """The log of a night in SQLite, with PLCs that fall silent and come back."""
 
 from collections.abc import Iterator
+import math
 import os
 from pathlib import Path
 import signal
 import sqlite3
+import struct
 import subprocess
 import sys
 import time
 
+from abdf1_ros.pccc.families import parse_address
+from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 import pytest
 from support.driver_bench import simulated_plc, store
@@ -107,13 +111,27 @@ def test_silent_plc_is_a_gap_of_its_own_rows(files: list[str], plcs: list[Simula
     assert start < first < last < time.time()
 
 
+def test_float_that_is_no_number_is_a_text(files: list[str], plcs: list[SimulatedPlc]) -> None:
+    Path(files[1]).write_text('Tag,Command,Address,Station,PLC_Type,Length\n'
+                              'one,Read,F8:0,2,PLC5,\ntwo,Read,F8:0,2,PLC5,2\n')
+    plcs[1].table.write(parse_address('F8:0', PlcType.PLC5),
+                        struct.pack('<2f', math.nan, -math.inf))
+    with begun(*files, '--seconds', '0.001') as night:
+        assert (night.communicate(timeout=PATIENCE)[1], night.returncode) == ('', 0)
+    assert logged(files[2], 'one') == [('nan', None)]
+    assert logged(files[2], 'two') == [('["nan", "-inf"]', None)]
+
+
 def test_end_and_failures_have_their_status(files: list[str], tmp_path: Path) -> None:
+    write_only = str(tmp_path / 'writes.csv')
+    Path(write_only).write_text('Tag,Command,Address,Station,PLC_Type\ncmd,Write,N7:1,1,SLC\n')
     for words, status, said in (
             ([*files, '--seconds', '0.001'], 0, ''),
             ([*files, '--seconds', 'nan'], 2, '"nan" should be a number of seconds above 0'),
             ([*files, '--every', '-1'], 2, '"-1" should be a number of seconds above 0'),
             ([*files[:2], str(tmp_path)], 1, f'{tmp_path}: unable to open database file'),
             ([files[0], files[0], files[2]], 2, 'net.csv:1'),
+            ([files[0], write_only, files[2]], 2, 'writes.csv: no row reads: nothing to log'),
             (['none.csv', *files[1:]], 2, 'none.csv')):
         with begun(*words) as night:
             assert said in night.communicate(timeout=PATIENCE)[1]

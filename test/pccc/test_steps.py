@@ -115,7 +115,7 @@ def test_what_must_not_be_written_is_refused_before_the_first_step() -> None:
     for text, length, fault in (('PD9:0.SP', 25, '25 float32 from PD9:0.SP reach to PD9:0.50'),
                                 ('C5:3/UN', 6, 'bits of a structure end with their word'),
                                 ('N7:0', 0, '0 elements do not fit at N7:0'),
-                                ('F8:1999', 2, '2 elements do not fit at F8:1999; the last'),
+                                ('F8:1999', 2, r'2 float32 \(4 words\) do not fit at F8:1999; '),
                                 ('ST9:0', 2, 'each string needs its own call, with length 1')):
         with pytest.raises(FormatError, match=f'^{fault}'):
             AddressedValues.of(text, PlcType.PLC5, length)

@@ -215,7 +215,7 @@ def test_stop_ends_what_runs_with_an_error(pty: Pty, link: Link, step: Step) -> 
     script, thread = link.begin(pty, step)
     thread.stop()
     assert not thread.is_alive()
-    assert script.end() == repr(PortLost('the driver is stopping'))
+    assert script.end() == repr(PortLost('closed by this program'))
     assert thread.state == PortState(False, 'closed')
     assert script.machine.counters.read_errors == 0
     open_port(PortSettings(str(pty.name))).close()

@@ -84,6 +84,8 @@ def test_two_stations_behind_one_gateway() -> None:
 
 
 @for_all(('cells', 'text'), [
+    ({'Via': '8.0'}, 'Via = "8.0" should be a whole number from 0 to 254: 8'),
+    ({'Via': '255.0'}, 'Via = "255.0" should be a whole number from 0 to 254'),
     ({'Via': '255'}, 'Via = "255" should be a whole number from 0 to 254'),
     ({'Via': 'KF3'}, 'Via = "KF3" should be a whole number from 0 to 254'),
     ({'Via': '3', 'Command': 'Serve'}, 'a Serve row has no Via: it is for Read, Write, ReadWrite '

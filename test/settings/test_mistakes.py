@@ -122,7 +122,7 @@ def test_address_that_cannot_be_used(tmp_path: Path, address: str, expected: str
         'than 255']),
     (f'{HEAD}\na,Read,N7:0,1.0,SLC\nb,Read,ST9:0/20,1,SLC\n', [
         '!2:4 (Station): 2501 ERR_BAD_STATION: Item: 1, Station = "1.0" should be a whole number '
-        'from 0 to 254',
+        'from 0 to 254: 1',
         '!3:3 (Address): 2503 ERR_ADDRESS_SYNTAX: Item: 2, Invalid Address Syntax (ST9:0/20); ST '
         'files have no bits to address; the length of a string is not written here']),
     (f'{HEAD},Type\na,Read,N7:255,1,SLC,int32\n', [

@@ -27,16 +27,19 @@ from functools import partial
 import sys
 
 from abdf1_ros.cli.plc.parser import check_order, help_asked, make_parser, verb
-from abdf1_ros.cli.terminal import EXIT_INTERRUPTED, prepare_output, run_command
+from abdf1_ros.cli.terminal import EXIT_INTERRUPTED, prepare_output, run_command, tell, YELLOW
 
 
 def main(args: Sequence[str] | None = None) -> int:
     """Carry out one command; return one of the exit statuses that --help lists."""
+    is_closed = sys.stdout is None
     prepare_output()
     parser = make_parser(__doc__)
     words = help_asked(sys.argv[1:] if args is None else args)
     check_order(parser, words)
     options = parser.parse_args(words)
+    if is_closed:
+        tell('plc', 'standard output is closed, so nothing that it prints can be seen', YELLOW)
     chosen = verb(options.command)
     return run_command('plc', partial(chosen.run, options), EXIT_INTERRUPTED,
                        getattr(chosen, 'UNREAD_STATUS', 0))

@@ -129,7 +129,7 @@ def _heads(mapping: Mapping, tags: Tags | None) -> Iterator[tuple[str, str]]:
 
 def _cells(mapping: Mapping, values: Values) -> tuple[Cell, list[str]]:
     if isinstance(values, str):
-        return Cell.TEXT, [printable(values)]
+        return Cell.TEXT, [values]
     cell = Cell.FLOAT if mapping.message_type is ValueType.FLOAT32 else Cell.INTEGER
     return cell, [*map(value_text, values)]
 

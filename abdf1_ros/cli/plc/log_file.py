@@ -40,7 +40,7 @@ from typing import NamedTuple
 
 from abdf1_ros.cli.terminal import check_reader, drop_output, reason_of
 from abdf1_ros.problems import ConfigurationError, Problem
-from abdf1_ros.text import shown
+from abdf1_ros.text import printable, shown
 
 COLUMNS = 'time', 'station', 'address', 'tag', 'value', 'reason'
 
@@ -97,7 +97,7 @@ def is_end_of_gap(reason: str) -> bool:
 
 
 def _csv_line(row: LogRow) -> str:
-    value = _quoted(row.text) if row.cell is Cell.TEXT else row.text
+    value = _quoted(printable(row.text)) if row.cell is Cell.TEXT else row.text
     return ','.join((_time(row), '' if row.station is None else str(row.station), row.address,
                      row.tag and _quoted(row.tag), value, row.reason and _quoted(row.reason)))
 
@@ -114,9 +114,10 @@ def _json_line(row: LogRow) -> str:
     number, reason = _finite(row)
     value = row.text if row.cell is Cell.TEXT else None if number is None else \
         int(number) if row.cell is Cell.INTEGER else float(number)
-    return json.dumps(dict(zip(COLUMNS, (
+    line = json.dumps(dict(zip(COLUMNS, (
         _time(row), row.station, row.address, row.tag, value, reason), strict=True)),
         ensure_ascii=False)
+    return ''.join(one if one.isprintable() else json.dumps(one)[1:-1] for one in line)
 
 
 def _finite(row: LogRow) -> tuple[str | None, str]:
@@ -137,7 +138,7 @@ def _line_protocol(row: LogRow) -> str:
             ('address', row.address), ('tag', row.tag)]
     fields = []
     if row.cell is Cell.TEXT:
-        fields.append(f'{row.cell.value}={_field_text(row.text)}')
+        fields.append(f'{row.cell.value}={_field_text(printable(row.text))}')
     elif number is not None:
         fields.append(f'{row.cell.value}={number}{"i" * (row.cell is Cell.INTEGER)}')
     if reason:

@@ -83,6 +83,12 @@ def test_rows_of_jsonl_are_read_by_the_reader_of_python() -> None:
     assert (found[1]['station'], found[1]['tag']) == (1, 'a "level", [%]=\\')
 
 
+def test_text_of_jsonl_is_that_of_the_plc_on_one_visible_line() -> None:
+    text = 'a\nb\x9b\\n'
+    line = FORMS['jsonl'].line(LogRow(WHEN, 2, 'ST9:0', '', Cell.TEXT, text))
+    assert line.isprintable() and json.loads(line)['value'] == text
+
+
 def test_rows_of_line_protocol_are_read_by_a_parser_of_another_project() -> None:
     parse_line = pytest.importorskip('line_protocol_parser').parse_line
     found = [parse_line(FORMS['influx'].line(row)) for row in ROWS]

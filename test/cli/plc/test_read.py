@@ -65,6 +65,8 @@ def test_read_shows_address_and_values(
     (('N7:0 B3:0/1',), '; several addresses stand apart: N7:0 B3:0/1'),
     (('N7:0,x',), ''), (('--csv', 'N7:0'), 'plc read: error: "plc watch --csv --count 1" prints '
                         'values for programs'),
+    (('N7:0', '--format', 'json'), 'plc read: error: "plc log --format jsonl --count 1" prints '
+     'values for programs'),
     (('N7:0', '--json'), 'plc read: error: "plc log --format jsonl --count 1" prints values for '
      'programs')])
 def test_mistaken_words_lead_to_the_right_ones(

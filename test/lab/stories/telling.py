@@ -32,6 +32,7 @@ from unittest import mock
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.kernel.fallback import FallbackState
 from abdf1_ros.driver.write import Outcome, Write
+from abdf1_ros.errors import CLOSED
 from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.plan.bounds import MODE_PERIOD
 from abdf1_ros.settings.heartbeats import HAND_OVER, LONGEST_END
@@ -408,7 +409,7 @@ class Telling:
     def end(self, argument: str) -> None:
         """End in order, as after a signal; another process begins so many seconds later."""
         def ended() -> None:
-            self.world.lose_port('the driver is stopping')
+            self.world.lose_port(CLOSED)
             self._judge.look()
             self._judge.over()
             self.kill(argument)

@@ -42,7 +42,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments."""
     add_addresses(parser)
     for name, words in (('--csv', 'watch --csv --count 1'),
-                        ('--json', 'log --format jsonl --count 1')):
+                        ('--json', 'log --format jsonl --count 1'),
+                        ('--format', 'log --format jsonl --count 1')):
         parser.add_argument(name, action=_Elsewhere, const=words, nargs=0, help=argparse.SUPPRESS)
 
 
