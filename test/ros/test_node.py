@@ -25,6 +25,7 @@ import signal
 import threading
 import time
 from typing import Any
+from unittest.mock import Mock
 
 from abdf1_ros.driver.kernel import waiting
 from abdf1_ros.pccc.families import parse_address
@@ -493,7 +494,7 @@ def test_publisher_of_our_topics_or_beside_them_is_told(
         status = ros.until_status(
             bench.diagnostics, 'topics', ros.ERROR, lambda status: 'recipe' in status.message)
         assert status.message == (
-            'ERROR: /stub publishes /abdf1/read/speed too; published, but not written: '
+            'ERROR: /stub publishes /abdf1/read/speed too; used, but not there: '
             '/abdf1/write/speed, /write/recipe')
         assert ros.details(status) == {
             '/abdf1/read/speed': 'is published by /stub too',
@@ -506,6 +507,28 @@ def test_publisher_of_our_topics_or_beside_them_is_told(
     ros.until_status(bench.diagnostics, 'topics', ros.OK)
     told = [line for line in capfd.readouterr().err.splitlines() if '/stub' in line]
     assert [line.partition(' ')[0] for line in told] == ['[ERROR]', '[WARN]', '[WARN]']
+
+
+def test_subscriber_and_client_of_what_there_is_not_are_told(
+        make_bench: Benches, capfd: Output) -> None:
+    bench = make_bench(SPEED, RECIPE)
+    with ros.Observer('stub') as stub:
+        for topic in '/abdf1/read/speed', '/abdf1/read/sped', '/abdf1/read/recipe':
+            stub.node.create_subscription(msg.Int16MultiArray, topic, Mock(), 1)
+        for name in '/abdf1/read_now/speed', '/abdf1/read_now/sped':
+            stub.node.create_client(Trigger, name)
+        status = ros.until_status(
+            bench.diagnostics, 'topics', ros.WARN, lambda status: len(status.values) == 3)
+        assert ros.details(status) == {
+            '/abdf1/read/sped': 'is subscribed to by /stub, but not published: no row reads this '
+                                'topic',
+            '/abdf1/read/recipe': 'is subscribed to by /stub, but not published: recipe is only '
+                                  'written',
+            '/abdf1/read_now/sped': 'is called by /stub, but not offered: only rows that are read '
+                                    'have it, within most_services; none has in Mode Listen'}
+    ros.until_status(bench.diagnostics, 'topics', ros.OK)
+    told = [line for line in capfd.readouterr().err.splitlines() if '/stub' in line]
+    assert [line.split()[0] for line in told] == 3 * ['[WARN]']
 
 
 def test_two_writers_of_a_topic_can_tell_their_results_apart(make_bench: Benches) -> None:

@@ -14,6 +14,7 @@
 
 """The names of a bridge's topics, and other nodes that publish them."""
 
+from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any
 
@@ -26,6 +27,7 @@ from abdf1_ros.ros.diagnostics.topics import TopicsStatus
 from abdf1_ros.ros.parameters.arguments import Arguments
 from abdf1_ros.ros.topic_names import TopicNames
 import pytest
+from rclpy.node import NodeNameNonExistentError
 from support.cases import for_all
 from support.mappings import make_mapping
 from support.ros import ERROR, OK, WARN
@@ -88,12 +90,18 @@ def test_remap_without_effect_is_told(remapped: str, reason: str) -> None:
         f'the remap of {name} has no effect: {reason}' for _ in range(bool(reason))]
 
 
+UNKNOWN = '_NODE_NAMESPACE_UNKNOWN_/_NODE_NAME_UNKNOWN_'
+
+
 class Domain:
     """Publishers and subscribers as a node sees them, by topic; ``counts`` are the queries."""
 
     def __init__(self, *topics: str) -> None:
         self.publishers: dict[str, list[str]] = {topic: ['/press'] for topic in topics}
         self.subscribers: dict[str, int] = {}
+        self.readers: dict[str, list[str]] = {}
+        self.services: dict[str, list[str]] = {}  # the nodes that offer each
+        self.clients: dict[str, list[str]] = {}
         self.counts: list[str] = []
 
     def count_publishers(self, topic: str) -> int:
@@ -103,17 +111,42 @@ class Domain:
     def count_subscribers(self, topic: str) -> int:
         return self.subscribers.get(topic, 0)
 
+    def count_services(self, service: str) -> int:
+        return len(self.services.get(service, ()))
+
+    def count_clients(self, service: str) -> int:
+        return len(self.clients.get(service, ()))
+
     def get_publishers_info_by_topic(self, topic: str) -> list[SimpleNamespace]:
-        parts = [node.rpartition('/') for node in self.publishers.get(topic, ())]
-        return [SimpleNamespace(node_name=name, node_namespace=namespace or '/')
-                for namespace, _, name in parts]
+        return _ends(self.publishers.get(topic, ()))
+
+    def get_subscriptions_info_by_topic(self, topic: str) -> list[SimpleNamespace]:
+        return _ends(self.readers.get(topic, ()))
 
     def get_topic_names_and_types(self) -> list[tuple[str, list[str]]]:
         return [(topic, ['std_msgs/msg/UInt8MultiArray'])
-                for topic in {**self.publishers, **self.subscribers}]
+                for topic in {**self.publishers, **self.subscribers, **self.readers}]
 
     def get_service_names_and_types(self) -> list[tuple[str, list[str]]]:
-        return []
+        return [(service, ['std_srvs/srv/Trigger'])
+                for service in {**self.services, **self.clients}]
+
+    def get_node_names_and_namespaces(self) -> list[tuple[str, str]]:
+        nodes = {node for nodes in self.clients.values() for node in nodes if node != UNKNOWN}
+        return [('gone', '/'), *((end.node_name, end.node_namespace) for end in _ends([*nodes]))]
+
+    def get_client_names_and_types_by_node(
+            self, name: str, namespace: str) -> list[tuple[str, list[str]]]:
+        if name == 'gone':
+            raise NodeNameNonExistentError
+        return [(service, []) for service, nodes in self.clients.items()
+                if f'{namespace.rstrip("/")}/{name}' in nodes]
+
+
+def _ends(nodes: Sequence[str]) -> list[SimpleNamespace]:
+    parts = [node.rpartition('/') for node in nodes]
+    return [SimpleNamespace(node_name=name, node_namespace=namespace or '/')
+            for namespace, _, name in parts]
 
 
 class Bench:
@@ -140,7 +173,6 @@ def bench() -> Bench:
     return Bench(names())
 
 
-UNKNOWN = '_NODE_NAMESPACE_UNKNOWN_/_NODE_NAME_UNKNOWN_'
 DOOR, LAMPS = '/press/read/door', '/press/read/lamps'
 IS_TOO = 'too: subscribers take its messages for ours. End it, or give its topics other names'
 
@@ -271,7 +303,7 @@ def test_message_that_nobody_takes_is_told_once(topic: str, reason: str) -> None
     bench.domain.publishers[topic] = ['/hmi']
     told = f'is published by /hmi, but not written: {reason}'
     assert [text for _, text in bench.told(0, 30)] == [f'{topic} {told}']
-    assert bench.status.judge(30) == (WARN, f'published, but not written: {topic}')
+    assert bench.status.judge(30) == (WARN, f'used, but not there: {topic}')
     assert bench.status.values(30) == {topic: told}
     del bench.domain.publishers[topic]
     bench.told(30, 40)
@@ -292,6 +324,49 @@ def test_message_that_a_node_may_take_is_not_told(topic: str, publishers: list[s
     bench.domain.publishers[topic] = publishers
     bench.domain.subscribers = {'/press/write/speed': 1, '/press/write/door': 1}
     assert bench.told(0, 30) == []
+
+
+@for_all(('topic', 'reason'), [
+    ('/press/read/dor', 'no row reads this topic'),
+    ('/press/read/recipe', 'recipe is only written'),
+    ('/press/read/lamps', 'this bridge publishes /cell/lamps'),
+    ('/read/door', 'this bridge publishes /press/read/door')])
+def test_subscriber_that_no_node_can_serve_is_told_once(topic: str, reason: str) -> None:
+    bench = Bench(names(read_lamps='/cell/lamps'))
+    bench.domain.readers = {topic: ['/cell/hmi', '/robot'], DOOR: ['/robot']}
+    told = f'is subscribed to by /cell/hmi, /robot, but not published: {reason}'
+    assert [text for _, text in bench.told(0, 30)] == [f'{topic} {told}']
+    assert bench.status.judge(30) == (WARN, f'used, but not there: {topic}')
+    assert bench.status.values(30) == {topic: told}
+    del bench.domain.readers[topic]
+    bench.told(30, 40)
+    assert bench.status.judge(40)[0] == OK
+
+
+@for_all(('topic', 'publishers'), [
+    ('/press/read/dor', ['/stub']), ('/read/door', ['/stub']), ('/read/dor', []),
+    ('/other/read/door', [])])
+def test_subscriber_that_another_node_may_serve_is_not_told(
+        topic: str, publishers: list[str]) -> None:
+    bench = Bench(names())
+    bench.domain.readers, bench.domain.publishers[topic] = {topic: ['/hmi']}, publishers
+    assert bench.told(0, 30) == []
+
+
+@for_all(('service', 'rows'), [
+    ('/press/set/speed', 'written rows of one bit'),
+    ('/press/read_now/dor', 'rows that are read')])
+def test_client_of_a_service_that_is_not_offered_is_told(service: str, rows: str) -> None:
+    bench = Bench(names())
+    bench.domain.clients = {service: ['/robot'], '/press/read_now/door': ['/robot'],
+                            '/other/read_now/dor': ['/robot']}
+    bench.domain.services = {'/press/read_now/door': ['/press']}
+    assert [text for _, text in bench.told(0, 30)] == [
+        f'{service} is called by /robot, but not offered: only {rows} have it, within '
+        'most_services; none has in Mode Listen']
+    bench.domain.clients = {service: [UNKNOWN]}
+    bench.told(30, 40)
+    assert 'a program without a node name' in bench.status.values(40)[service]
 
 
 def test_topic_without_the_name_of_the_node_may_belong_to_another_node() -> None:

@@ -23,7 +23,7 @@ share one ``Graph``. The longer a query takes, the longer is the pause after it.
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from collections.abc import Mapping as MappingType
 from contextlib import suppress
 from functools import partial
@@ -61,31 +61,36 @@ _UNKNOWN = '_NODE_NAME_UNKNOWN_'
 UNKNOWN_NODE = 'a program without a node name'
 
 
+# Between the name of a bridge and that of a row: in its topics, and in its services.
+ROW_PARTS = 'write', 'read', 'set', 'read_now'
+
+
 class GraphTopics(NamedTuple):
     """
     The odd topics of one query.
 
     - ``clashes``: the types of each topic with more than one
-    - ``below_write``: the topics ``<prefix>/write/<rest>``, by prefix
+    - ``below``: the names ``<prefix>/<part>/<rest>`` of each part in ``ROW_PARTS``, by both
     - ``services``: the types of each service with more than one: a client uses another
     """
 
     clashes: MappingType[str, list[str]]
-    below_write: MappingType[str, list[str]]
+    below: MappingType[tuple[str, str], list[str]]
     services: MappingType[str, list[str]]
 
     @classmethod
-    def of(cls, found: Iterable[tuple[str, list[str]]],
-           services: Iterable[tuple[str, list[str]]]) -> GraphTopics:
+    def of(cls, found: Collection[tuple[str, list[str]]],
+           services: Collection[tuple[str, list[str]]]) -> GraphTopics:
         """Return the odd topics among topics and services with their types."""
-        clashes, below_write = {}, defaultdict[str, list[str]](list)
-        for topic, types in found:
-            if len(types) > 1:
-                clashes[topic] = types
-            if '/write/' in topic:
-                below_write[topic.partition('/write/')[0]].append(topic)
-        return cls(clashes, below_write, {
-            service: types for service, types in services if len(types) > 1})
+        below = defaultdict[tuple[str, str], list[str]](list)
+        clashes = []
+        for names, parts in (found, ROW_PARTS[:2]), (services, ROW_PARTS[2:]):
+            clashes.append({name: types for name, types in names if len(types) > 1})
+            for name, _ in names:
+                for part in parts:
+                    if f'/{part}/' in name:
+                        below[name.partition(f'/{part}/')[0], part].append(name)
+        return cls(clashes[0], below, clashes[1])
 
 
 class Graph:
@@ -137,13 +142,27 @@ class Graph:
         """Return the number of subscribers of a topic, by its full name."""
         return self._source.count_subscribers(topic)
 
+    def count_services(self, service: str) -> int:
+        """Return how many nodes offer a service, by its full name."""
+        return self._source.count_services(service)
+
     def publishers(self, topic: str) -> list[str]:
         """Return the full names of the nodes that publish a topic, one for each publisher."""
-        try:
-            ends = self._source.get_publishers_info_by_topic(topic)
-        except UnicodeDecodeError:  # rclpy cannot read the name of one of them
-            return ['a node whose name cannot be read']
-        return [*map(node_of, ends)]
+        return _nodes(self._source.get_publishers_info_by_topic, topic)
+
+    def subscribers(self, topic: str) -> list[str]:
+        """Return the full names of the nodes that subscribe to a topic."""
+        return _nodes(self._source.get_subscriptions_info_by_topic, topic)
+
+    def clients(self, service: str) -> list[str]:
+        """Return the full names of the nodes that have a client of a service."""
+        found = []
+        for name, namespace in self._source.get_node_names_and_namespaces():
+            with suppress(NodeNameNonExistentError):  # it has gone
+                if service in dict(self._source.get_client_names_and_types_by_node(
+                        name, namespace)):
+                    found.append(f'{namespace.rstrip("/")}/{name}')
+        return found or [UNKNOWN_NODE] * self._source.count_clients(service)
 
     def has_other(self, topic: str, kind: str, name: str) -> bool:
         """Tell whether a node other than ``name`` has this topic with this type now."""
@@ -153,6 +172,14 @@ class Graph:
         except UnicodeDecodeError:  # rclpy cannot read the name of a node, so it is not ours
             return True
         return any(end.topic_type == kind and node_of(end) != name for end in ends)
+
+
+def _nodes(ends_of: Callable[[str], list[TopicEndpointInfo]], topic: str) -> list[str]:
+    try:
+        ends = ends_of(topic)
+    except UnicodeDecodeError:  # rclpy cannot read the name of one of them
+        return ['a node whose name cannot be read']
+    return [*map(node_of, ends)]
 
 
 def node_of(end: TopicEndpointInfo) -> str:

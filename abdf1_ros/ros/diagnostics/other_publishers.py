@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Find other nodes that publish topics of ours, or that publish beside them.
+Find other nodes that publish topics of ours, or that use names beside ours.
 
 A subscriber cannot tell the messages of a second publisher from ours, and DDS has no event that
 tells one publisher of another. So we count the publishers of our topics in the ROS graph, each
@@ -23,8 +23,8 @@ once a second.
 from __future__ import annotations
 
 from collections import defaultdict, deque
-from collections.abc import Collection, Iterator
-from itertools import chain, islice
+from collections.abc import Callable, Collection, Iterator, Mapping
+from itertools import islice
 import math
 from typing import NamedTuple
 
@@ -133,24 +133,67 @@ class OtherPublisherWatch:
         return tuple(sorted(_told(found.nodes, found.nameless, now) - {self._our_name}))
 
 
+class _Side(NamedTuple):
+    """
+    What other nodes use of a bridge: its write topics, its read topics, or one kind of services.
+
+    - ``part``: of the names, in ``ROW_PARTS``
+    - ``users``: returns the nodes that use a name
+    - ``others``: returns the number of partners that these nodes have; ours has none
+    - ``use``: how the nodes use it, and what is missing
+    - ``unknown``: what is wrong with a row that there is not
+    - ``names``: the full names by the topic of the row; none for services
+    - ``verb``: what the bridge does with these topics
+    - ``opposite``: the rows of the other direction, which are ``only`` so
+    """
+
+    part: str
+    users: Callable[[str], list[str]]
+    others: Callable[[str], int]
+    use: tuple[str, str]
+    unknown: str
+    names: Mapping[str, str] = {}
+    verb: str = ''
+    opposite: Collection[str] = ()
+    only: str = ''
+
+    def reason(self, row: str) -> str:
+        """Return what is wrong with a name, from the topic of the row."""
+        if row in self.names:
+            return f'this bridge {self.verb} {self.names[row]}'
+        return f'{row} is only {self.only}' if row in self.opposite else self.unknown
+
+
+def _sides(graph: Graph, names: TopicNames) -> Iterator[_Side]:
+    yield _Side('write', graph.publishers, graph.count_subscribers, ('published', 'not written'),
+                'no row writes this topic', names.written, 'takes', names.read, 'read')
+    yield _Side('read', graph.subscribers, graph.count_publishers,
+                ('subscribed to', 'not published'), 'no row reads this topic',
+                names.read, 'publishes', names.written, 'written')
+    for part, rows in ('set', 'written rows of one bit'), ('read_now', 'rows that are read'):
+        yield _Side(part, graph.clients, graph.count_services, ('called', 'not offered'),
+                    f'only {rows} have it, within most_services; none has in Mode Listen')
+
+
 class StrayWatch:
     """
-    Reports publishers of topics that look like our write topics, and that no node takes.
+    Reports nodes that use topics or services that look like ours, and that no node has.
 
-    These are topics below ``~/write/`` without a Write row, and our write topics without the name
-    of the node or without the namespace.
+    These are topics below ``~/write/`` without a Write row, published; topics below ``~/read/``
+    without a Read row, subscribed to; and both without the name of the node or without the
+    namespace. Of the services of rows, these are clients of one that is not offered.
     """
 
     def __init__(self, graph: Graph, our_name: str, names: TopicNames, seen: Seen) -> None:
         self._graph = graph
         self._our_name = our_name
-        self._names = names
         self._seen = seen
         self._topics: GraphTopics | None = None
         self._nameless: dict[str, float] = {}
+        self._sides = tuple(_sides(graph, names))
 
     def look(self, now: float) -> list[News]:
-        """Return the topics that are new at the clock value ``now`` (s), each once."""
+        """Return the names that are new at the clock value ``now`` (s), each once."""
         topics = self._graph.topics(now)
         if topics is self._topics:
             return []
@@ -160,35 +203,26 @@ class StrayWatch:
                 for topic, text in self._seen.strays.items() if topic not in before]
 
     def _strays(self, topics: GraphTopics, now: float) -> Iterator[tuple[str, str]]:
-        beside = chain(self._below(topics), self._beside(topics))
         before, self._nameless = self._nameless, {}
-        for topic, reason in islice(beside, _MOST_BESIDE):
-            nodes = self._graph.publishers(topic)
-            nameless = _nameless(nodes, before.get(topic, math.inf), now)
-            self._nameless[topic] = nameless
-            if told := sorted(_told(nodes, nameless, now)):
-                yield topic, f'is published by {first(told)}, but not written: {reason}'
+        for side in self._sides:
+            done, lacks = side.use
+            for name, reason in islice(self._unmet(side, topics), _MOST_BESIDE):
+                nodes = side.users(name)
+                nameless = _nameless(nodes, before.get(name, math.inf), now)
+                self._nameless[name] = nameless
+                if told := sorted(_told(nodes, nameless, now)):
+                    yield name, f'is {done} by {first(told)}, but {lacks}: {reason}'
 
-    def _below(self, topics: GraphTopics) -> Iterator[tuple[str, str]]:
-        """Yield topics below ``~/write/`` that are not ours, and why they are not."""
-        names, taken = self._names, {*self._names.written.values()}
-        for topic in topics.below_write.get(self._our_name, ()):
-            below = topic.removeprefix(f'{self._our_name}/write/')
-            if topic in taken:
-                continue
-            if below in names.written:
-                yield topic, self._takes(below)
-            else:
-                yield topic, f'{below} is only read' if below in names.read else \
-                    'no row writes this topic'
-
-    def _beside(self, topics: GraphTopics) -> Iterator[tuple[str, str]]:
-        """Yield our write topics without the node's name, where no node takes them."""
-        for prefix in {'', self._our_name.rpartition('/')[0]}:
-            for topic in topics.below_write.get(prefix, ()):
-                below = topic.removeprefix(f'{prefix}/write/')
-                if below in self._names.written and not self._graph.count_subscribers(topic):
-                    yield topic, self._takes(below)
-
-    def _takes(self, below: str) -> str:
-        return f'this bridge takes {self._names.written[below]}'
+    def _unmet(self, side: _Side, topics: GraphTopics) -> Iterator[tuple[str, str]]:
+        """Yield names that look like ours, and that no node has; and what is wrong with each."""
+        ours = {*side.names.values()}
+        namespace = self._our_name.rpartition('/')[0]
+        for prefix in dict.fromkeys((self._our_name, '', namespace)):
+            is_below = prefix == self._our_name
+            for name in topics.below.get((prefix, side.part), ()):
+                row = name.removeprefix(f'{prefix}/{side.part}/')
+                if name in ours or not (is_below or row in side.names):
+                    continue
+                # Below our name only we take messages: another subscriber may record them.
+                if (is_below and side.part == 'write') or not side.others(name):
+                    yield name, side.reason(row)

@@ -67,7 +67,7 @@ class Seen:
     other_publishers: dict[str, Sequence[str]] = field(default_factory=dict)
     """The other nodes that publish a topic of ours, by topic."""
     strays: Mapping[str, str] = field(default_factory=dict)
-    """Who publishes beside our topics, and why nothing is written, by topic."""
+    """Who uses names beside our topics and services, and what is missing, by name."""
     refused: Mapping[str, str] = field(default_factory=dict)
     """Topics with Single_Publisher and more than one publisher, with their names."""
     conflicts: dict[str, str] = field(default_factory=dict)

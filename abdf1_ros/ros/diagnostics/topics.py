@@ -25,7 +25,7 @@ _MOST_SHOWN = 40  # topics with another publisher that the status shows in its v
 
 
 class TopicsStatus:
-    """Which topics of this bridge other nodes publish, and which topics no node takes."""
+    """Which topics of this bridge other nodes publish, and which names beside ours they use."""
 
     name = 'topics'
 
@@ -42,7 +42,7 @@ class TopicsStatus:
             notes.append(f'{first(nodes)} {"publishes" if len(nodes) == 1 else "publish"} '
                          f'{first(sorted(others))} too')
         if strays:
-            notes.append(f'published, but not written: {first(sorted(strays))}')
+            notes.append(f'used, but not there: {first(sorted(strays))}')
         return ERROR if others else WARN if strays else OK, \
             '; '.join(notes) or 'no other node publishes topics of this bridge'
 
