@@ -176,6 +176,8 @@ def _meant(address: str) -> str:
     parts = re.split('[,; ]+', address.strip(',; '))
     if len(parts) > 1 and all(map(looks_like_address, parts)):
         return f'; several addresses stand apart: {" ".join(parts)}'
+    if address.isidentifier() and ('_' in address or address.isalpha()):
+        return '; a tag needs --map FILE'
     return ''
 
 
