@@ -88,6 +88,11 @@ class ValueType(Enum):
         low, high = self.range
         return f'a whole number from {low:.0f} to {high:.0f}'
 
+    def refusal(self, value: float, index: int) -> FormatError:
+        """Return the error about a number that cannot be such a value."""
+        return FormatError(
+            f'value {value} at index {index} is not a valid {self.value}, {self.form}')
+
 
 class WordOrder(Enum):
     """Which word of a 32-bit value over 16-bit words comes first."""
@@ -191,8 +196,7 @@ class Codec:
         for index, value in enumerate(values):
             is_whole = self.type is ValueType.FLOAT32 or value % 1 == 0
             if not low <= value <= high or not is_whole:  # also NaN
-                raise FormatError(f'value {value} at index {index} is not a valid '
-                                  f'{self.type.value}, {self.type.form}')
+                raise self.type.refusal(value, index)
 
     def encode(self, values: Sequence[float] | str) -> bytes:
         """Return whole words for ``values`` that ``check`` has passed; not for parts of words."""

@@ -63,8 +63,7 @@ def check_foreign(mapping: Mapping, raw: float, index: int) -> None:
     as the limit. Min and Max of a Read row have no effect.
     """
     if not math.isfinite(raw):
-        raise FormatError(f'value {raw} at index {index} is not a valid {mapping.type.value}, '
-                          f'{mapping.type.form}')
+        raise mapping.type.refusal(raw, index)
     scaling, tolerance = mapping.scaling or _UNSCALED, _EXACT
     low, high = sorted((end - scaling.offset) / scaling.scale
                        for end in _limits_in_effect(mapping))

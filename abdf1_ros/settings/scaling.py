@@ -43,14 +43,16 @@ class Scaling:
         return array('f', [value * self.scale + self.offset for value in raw])
 
     def raw(self, values: Sequence[float], kind: ValueType) -> list[float]:
-        """Return the nearest raw values; FormatError where they exceed the range of ``kind``."""
+        """Return the nearest raw values; FormatError outside of ``kind``, and for NaN."""
         low, high = kind.range
         found: list[float] = []
         for index, value in enumerate(map(_float_of, values)):
+            if math.isnan(value):
+                raise ValueType.FLOAT32.refusal(value, index)
             nearest = (value - self.offset) / self.scale
             if kind is not ValueType.FLOAT32 and math.isfinite(nearest):
                 nearest = round(nearest)
-            if not low <= nearest <= high:  # also NaN
+            if not low <= nearest <= high:
                 raise FormatError(f'value {value:.7g} at index {index} is outside '
                                   f'{self._range(kind)}')
             found.append(nearest)

@@ -72,7 +72,7 @@ def test_nearest_raw_value_is_written_and_halves_go_to_the_even_one(
      'value 10.5 at index 1 is outside -32757.5 to 10, the range of uint16 with Scale -0.5, '
      'Offset 10'),
     (ValueType.BCD16, Scaling(1.0, 0.0), math.nan,
-     'value nan at index 1 is outside 0 to 9999, the range of bcd16 with Scale 1, Offset 0'),
+     'value nan at index 1 is not a valid float32, a number such as -1.5 or 2e3, at most 3.4e38'),
     (ValueType.UINT32, Scaling(0.001, 0.0), math.inf,
      'value inf at index 1 is outside 0 to 4294967.295, the range of uint32 with Scale 0.001, '
      'Offset 0'),
