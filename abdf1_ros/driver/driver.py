@@ -228,7 +228,7 @@ class Driver:
         """
         if self.overheard is not None:
             answer(ReadAnswer(error=f'Mode {self.network.mode}: nothing is sent'))
-        elif self.kernel.end.is_asked:
+        elif self.is_online and self.kernel.end.is_asked:
             answer(ReadAnswer(error=ENDS))
         elif not self.readings.demands.inbox.put(ReadCall(mapping, answer)):
             answer(ReadAnswer(error=_NOT_OPEN))

@@ -338,6 +338,9 @@ def test_lost_port_and_the_end_answer_every_call() -> None:
     line.driver.kernel.end.wind_down()
     line.ask(RECIPE)
     assert line.errors[-1] == 'this node ends'
+    line.lose_port()  # as at ~/polling
+    line.ask(RECIPE)
+    assert line.errors[-1] == 'the port is not open'
 
 
 def test_each_call_ends_at_its_own_time_whatever_came_after_it() -> None:
