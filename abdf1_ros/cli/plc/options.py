@@ -186,7 +186,8 @@ def add_repetition(parser: argparse.ArgumentParser) -> None:
                         type=number_option('seconds from 0 to 60; 0.5 is 500 ms', 0, 60),
                         help='s between reads of addresses and of rows without Period, up to 60 '
                              '(default: %(default)s)')
-    parser.add_argument('--count', type=COUNT, metavar='N', help='end after N reads')
+    parser.add_argument('--count', type=COUNT, metavar='N',
+                        help='end when each address has been read N times; a failed read counts')
 
 
 def stations_option(text: str, right: str = '') -> tuple[int, ...]:
