@@ -207,7 +207,8 @@ def _family(text: str) -> str:
 
 
 def _station(text: str) -> int:
-    stations = stations_option(text)
+    right = f'"{text}" should be one station, a number from 0 to 254'
+    stations = stations_option(text, right)
     if len(stations) != 1:
-        raise argparse.ArgumentTypeError(f'"{text}" should be one station')
+        raise argparse.ArgumentTypeError(right)
     return stations[0]

@@ -27,6 +27,7 @@ from abdf1_ros.cli.plc.data import labels, Radix, rows, Tags, value_texts
 from abdf1_ros.cli.plc.reading import NoValue, RepeatedReads, WatchedRead
 from abdf1_ros.cli.terminal import check_reader, is_terminal, table, tell
 from abdf1_ros.pccc.values import Values
+from abdf1_ros.ports.clock import line_time
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.text import bar, BARS, counted, cut, printable
@@ -91,7 +92,7 @@ class LiveValues(RepeatedReads):
         for _, mapping, what in news:
             before = self._shown.get(mapping)
             if before is not None and before != what:
-                self._changed[mapping] = self._driver.machine.now
+                self._changed[mapping] = line_time()
             self._shown[mapping] = what
             if isinstance(what, NoValue):
                 # one gap per silence, so that the curve keeps the values before it
@@ -114,7 +115,7 @@ class LiveValues(RepeatedReads):
 
     def _head(self, mapping: Mapping) -> tuple[str, ...]:
         """Return the text between an address and its values."""
-        now = self._driver.machine.now
+        now = line_time()  # the clock of the machine stands still while the port is lost
         age = self._driver.points[mapping].age(now)
         is_new = now - self._changed.get(mapping, -math.inf) < MARKED
         return (str(mapping.station), mapping.type.value,

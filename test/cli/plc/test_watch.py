@@ -32,6 +32,7 @@ from abdf1_ros.cli.plc.data import mapping_of, Radix, Tags
 from abdf1_ros.cli.plc.reading import NewReads, NoValue, WatchedRead
 from abdf1_ros.cli.plc.watch import curve_of, LiveValues
 from abdf1_ros.driver.checks import Checks, StationHealth
+from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity, Mode
 from abdf1_ros.pccc.values import Values
@@ -210,6 +211,13 @@ class Screen:
             self.lines[self._row] = ''
         if final == 'J':
             del self.lines[self._row + 1:]
+
+
+def test_age_counts_on_while_the_port_is_lost(
+        draw: Draw, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr('abdf1_ros.cli.plc.watch.line_time', lambda: 110.5)
+    monkeypatch.setattr(ReadPoint, 'age', lambda self, now: now - 100.0)
+    assert any(' 10.5 ' in line for line in draw([SPEED], (SPEED, NoValue('port lost'))))
 
 
 def test_nothing_old_stays_below_a_table_that_shrinks(
