@@ -152,18 +152,15 @@ RULES = (
          'on the way changes or drops bytes',
          'look for flow control, a telnet port and long messages, then for noise',
          Traces(damaged=4, is_garbled=True), Decider.ECHOES),
-    Rule('half duplex: DLE NAK, which no slave sends',
-         lambda t: t.mode.is_master and t.naks + t.naks_to_polls > 0 and not t.settings,
-         'DLE NAK comes, which no slave sends: the channel of the PLC is set to full duplex',
-         'use Mode Peer, --peer of "plc"', Traces(naks=4, characters=8, first=_TWO)),
     Rule('full duplex: DLE NAK to all messages, whichever check they have',
-         lambda t: t.naks > 0 and not t.acks and t.takes_other_check is False,
+         lambda t: not t.mode.is_master and t.naks > 0 and not t.acks
+         and t.takes_other_check is False,
          'the PLC answers DLE NAK to all, with CRC and with BCC: it has no room for messages, or '
          'ours arrive damaged',
          'end other programs that use this PLC, also over its other ports; then ' + _NOISE,
          Traces(PEER, naks=4, takes_other_check=False)),
     Rule('full duplex: DLE NAK to all messages',
-         lambda t: t.naks > 0 and not t.acks,
+         lambda t: not t.mode.is_master and t.naks > 0 and not t.acks,
          'the PLC answers DLE NAK to all: is Error_Code right?',
          'try Error_Code {t.other_check}', Traces(PEER, naks=4), Decider.OTHER_CHECK),
     Rule('a reply after Cmd_Timeout',
@@ -229,6 +226,10 @@ RULES = (
          'a full-duplex port answers, but takes no command for station {t.station}',
          '"plc scan 0-63 --peer" shows which stations reply; then try Error_Code '
          '{t.other_check}', Traces(PEER, enquiries=4, characters=8, first=_ONE)),
+    Rule('half duplex: DLE NAK, which no slave sends',
+         lambda t: t.mode.is_master and t.naks + t.naks_to_polls > 0,
+         'DLE NAK comes, which no slave sends: the channel of the PLC is set to full duplex',
+         'use Mode Peer, --peer of "plc"', Traces(naks=4, characters=8, first=_TWO)),
     Rule('Mode Slave: the master polls us, and no reply comes',
          lambda t: t.polled,
          'the master polls us, and no reply of station {t.station} comes: does it pass messages '

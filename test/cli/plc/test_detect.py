@@ -195,6 +195,15 @@ def test_full_duplex_port_with_another_station_is_heard_all_the_same(tmp_path: P
         'Error_Code BCC']
 
 
+def test_full_duplex_port_is_named_where_only_half_duplex_was_tried(tmp_path: Path) -> None:
+    with plc_on(tmp_path / 'line', 'CRC', Duplex.FULL) as network:
+        search = Search(network, [1, 2])
+        assert search.run([9600], ['Master'], ['CRC']) is None
+    assert [*conclusion(search.traces)] == [
+        '9600 baud, half duplex, CRC: DLE NAK comes, which no slave sends: the channel of the PLC '
+        'is set to full duplex. Next: use Mode Peer, --peer of "plc"']
+
+
 def test_characters_of_before_an_echo_was_seen_are_no_trace(
         monkeypatch: pytest.MonkeyPatch) -> None:
     class EchoedSession:
