@@ -77,7 +77,7 @@ from abdf1_ros.sniffer.entries import Entry
 from abdf1_ros.sniffer.ethernet_ip import DEVICE_SERVERS
 from abdf1_ros.sniffer.pcapng import PcapngWriter
 from abdf1_ros.sniffer.report import json_line, summary_json, summary_lines, text_line
-from abdf1_ros.sniffer.summary import Summary
+from abdf1_ros.sniffer.summary import MISSING, Summary
 from abdf1_ros.sniffer.texts import TextProblem
 from abdf1_ros.sniffer.traffic import TrafficDecoder
 from abdf1_ros.text import counted, printable
@@ -190,6 +190,7 @@ class Output:
     def end(self) -> None:
         """Print the remaining entries, then the summary."""
         self._finish(self.begin({}))
+        self._summary.end()
         if self._packets:
             self._packets.close()
         self.sum_up()
@@ -236,6 +237,8 @@ class Output:
 
     def _print(self, entry: Entry) -> None:
         self._summary.add(entry)
+        if entry.kind in MISSING and self._summary.is_one_sided:
+            return  # it may have been said by the side that was not recorded
         for picture in (self._bundle, self._timeline):
             if picture:
                 picture.add(entry)

@@ -91,6 +91,7 @@ def summary_json(summary: Summary, kind: LineKind) -> str:
         'check': kind.checksum.value if kind.checksum else None,
         'duplex': kind.duplex.name.lower() if kind.duplex else None, 'baud': summary.baud,
         'load': None if load is None else round(load, 4),
+        **({'one_sided': True} if summary.is_one_sided else {}),
         **_counts(summary.all),
         'stations': {str(station): _counts(counts)
                      for station, counts in sorted(summary.stations.items())}})
@@ -122,6 +123,8 @@ def summary_lines(summary: Summary, kind: LineKind) -> Iterator[str]:
         (counts.marks[Mark.DUPLICATE], 'duplicate'),
         (counts.kinds[Kind.UNANSWERED], 'command without reply'),
         (counts.kinds[Kind.SILENCE], 'polls and messages without answer'))
+    if summary.is_one_sided:
+        yield '  only one side of the line was recorded, so missing answers are not counted'
     if counts.latency.count:
         yield (f'  replies after: mean {counts.latency.mean * 1000:.1f} ms, '
                f'max {counts.latency.longest * 1000:.1f} ms')

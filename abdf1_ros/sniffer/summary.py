@@ -24,6 +24,7 @@ from abdf1_ros.sniffer.capture import Chunk, Direction
 from abdf1_ros.sniffer.entries import Entry, Kind, Mark
 
 BITS_PER_CHARACTER = 10
+MISSING = Kind.SILENCE, Kind.UNANSWERED
 
 
 @dataclass(slots=True)
@@ -73,6 +74,12 @@ class Counts:
         if entry.latency is not None:
             self.latency.add(entry.latency)
 
+    def leave_out_answers(self) -> None:
+        """Do not count what is missing because its side of the line was not recorded."""
+        for kind in MISSING:
+            del self.kinds[kind]
+        del self.marks[Mark.STRAY]
+
 
 class Summary:
     """
@@ -86,6 +93,8 @@ class Summary:
         self.all = Counts()
         self.stations: defaultdict[int, Counts] = defaultdict(Counts)
         self.bytes: Counter[Direction] = Counter()
+        self._senders: set[Direction] = set()
+        self._has_answers = False
         self._earlier = 0.0  # seconds of the recordings before this one
         self._first: float | None = None
         self._last: float | None = None
@@ -104,6 +113,30 @@ class Summary:
         self.all.add(entry)
         if entry.station is not None:
             self.stations[entry.station].add(entry)
+        if entry.kind not in MISSING:
+            self._senders.add(entry.direction)
+        self._has_answers |= entry.request is not None
+
+    @property
+    def is_one_sided(self) -> bool:
+        """
+        Return True if only one side of the line was recorded.
+
+        What it acknowledges or answers proves the other side, which is not in the recording.
+        """
+        kinds = self.all.kinds
+        if not kinds[Kind.COMMAND] + kinds[Kind.POLL]:
+            return kinds[Kind.REPLY] > 0
+        if self._has_answers or kinds[Kind.EOT]:
+            return False
+        return len(self._senders) == 1 and Direction.UNKNOWN not in self._senders and (
+            kinds[Kind.ACK] + kinds[Kind.REPLY] > 0)
+
+    def end(self) -> None:
+        """Count no missing answers if their side of the line was not recorded."""
+        if self.is_one_sided:
+            for counts in (self.all, *self.stations.values()):
+                counts.leave_out_answers()
 
     @property
     def seconds(self) -> float | None:

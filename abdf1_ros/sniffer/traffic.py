@@ -40,6 +40,7 @@ _PART = 4096
 # After this number of replies without any DLE ACK, NAK or ENQ the line is treated as radio modem.
 _RADIO_REPLIES = 3
 
+_POLL = 'poll'  # an awaited answer
 _CONTROLS = {
     Code.ACK: (Kind.ACK, ''), Code.NAK: (Kind.NAK, ''),
     Code.EOT: (Kind.EOT, 'nothing to send'), Code.ENQ: (Kind.ENQ, 'asks for the last answer'),
@@ -175,6 +176,8 @@ class TrafficDecoder:
         if _is_masters(symbol):
             return Direction.OUT
         if isinstance(symbol, Control) and symbol.code is Code.ACK:
+            if self._awaited is not None and self._awaited[1] == _POLL:
+                return self._last_asker  # it is for an answer that was not recorded
             return self._last_asker.opposite
         return direction if isinstance(symbol, Unknown) else Direction.IN
 
@@ -185,13 +188,13 @@ class TrafficDecoder:
         if awaited is not None and self._is_half:
             asker, what = awaited
             self._awaited = None
-            if direction is asker:
+            if direction is asker and _is_masters(symbol):
                 yield Entry(time, asker.opposite, Kind.SILENCE, f'no answer to the {what}',
                             self._station)
         if isinstance(symbol, Poll | Frame):
             self._last_asker = direction
         if isinstance(symbol, Poll):
-            self._awaited = direction, 'poll'
+            self._awaited = direction, _POLL
         elif isinstance(symbol, Frame) and symbol.station not in (None, BROADCAST):
             self._awaited = direction, 'message'
 

@@ -25,6 +25,7 @@ from abdf1_ros.sniffer.capture import Chunk, Direction
 from abdf1_ros.sniffer.entries import Entry, Kind, Mark
 from abdf1_ros.sniffer.report import json_line, summary_json, summary_lines, text_line
 from abdf1_ros.sniffer.summary import Summary
+from abdf1_ros.sniffer.traffic import TrafficDecoder
 import pytest
 from support.cases import for_all
 
@@ -123,6 +124,29 @@ def test_json_has_all_that_the_summary_tells(summary: Summary) -> None:
     assert [*found['marks'].values()] == [9, 11, 12, 14, 16, 18]
     nothing = json.loads(summary_json(Summary(), LineKind(None, None)))
     assert (nothing['check'], nothing['duplex'], nothing['load']) == (None, None, None)
+
+
+def test_silence_of_a_side_that_was_not_recorded_is_no_fault() -> None:
+    """The ACK of a master after its poll shows that the slave has answered."""
+    command = bytes.fromhex('10010110020105 0F00EEFE 6800000400060700 0400 1003E24E')
+    reply = bytes.fromhex('10020501 4F00EEFE 990909 42D5002D0300000000 10035AC6')
+    poll, ack, eot = bytes.fromhex('100501FF'), b'\x10\x06', b'\x10\x04'
+    for said, way, is_one_sided in (
+            ([command, poll, ack], OUT, True), ([command, poll, ack], Direction.UNKNOWN, True),
+            ([command, poll, poll], OUT, False), ([command, ack, poll, eot], IN, False),
+            ([ack, reply], IN, True), ([command, ack, poll, reply, ack], IN, False)):
+        decoder, summary = TrafficDecoder(Checksum.CRC, Duplex.HALF), Summary()
+        for data in said:
+            for entry in decoder.feed(Chunk(0.0, way, data)):
+                summary.add(entry)
+        for entry in decoder.finish():
+            summary.add(entry)
+        summary.end()
+        text = '\n'.join(summary_lines(summary, HALF))
+        assert ('only one side of the line was recorded' in text) is is_one_sided, text
+        if is_one_sided:
+            assert 'faults: none' in text
+            assert json.loads(summary_json(summary, HALF))['one_sided']
 
 
 def test_what_is_not_known_is_left_out() -> None:
