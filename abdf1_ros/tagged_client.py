@@ -39,7 +39,7 @@ from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.values import Values
 from abdf1_ros.plan.usable_rows import line_problems
 from abdf1_ros.ports.settings import PortSettings
-from abdf1_ros.problems import ConfigurationError
+from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.readings import Reading, readings_of_rows, values_of_rows
 from abdf1_ros.settings.limits import raw_values
 from abdf1_ros.settings.map_file import load_mappings
@@ -64,7 +64,10 @@ class TaggedClient(BlockingClient):
     def __init__(self, net_file: str, map_file: str, trace: str | None = None,
                  logger: logging.Logger = LOG) -> None:
         # With Standard only the stations of a driver are polled, all the time.
-        network = replace(load_network(net_file), polling=Network().polling)
+        try:
+            network = replace(load_network(net_file), polling=Network().polling)
+        except ConfigurationError as error:
+            raise ConfigurationError([*error.problems, *_faults_of_map(map_file)]) from None
         mappings, problems = load_mappings(map_file)
         problems += [problem for _, problem in line_problems(mappings, network)]
         if problems:
@@ -147,6 +150,13 @@ class TaggedClient(BlockingClient):
             raise FormatError(f'tag {shown(repr(tag))} should be that of a row that is {what}: '
                               f'{first(fitting) or "the map has none"}')
         return row
+
+
+def _faults_of_map(map_file: str) -> list[Problem]:
+    try:
+        return load_mappings(map_file)[1]
+    except ConfigurationError as error:
+        return error.problems
 
 
 def _named(row: Mapping) -> str:

@@ -667,6 +667,9 @@ def test_faults_of_the_files_are_told_before_the_port_is_opened(tmp_path: Path) 
     with pytest.raises(ConfigurationError) as error:
         Client.from_files(*files(tmp_path, '/dev/none', rows))
     assert [problem.place.line for problem in error.value.problems] == [9, 10]
+    for map_file in str(tmp_path / 'map.csv'), 'nox.csv':
+        with pytest.raises(ConfigurationError, match='^nix.csv: .*\n.*(map.csv:9|nox.csv)'):
+            Client.from_files('nix.csv', map_file)
     with pytest.raises(ConfigurationError, match='^Mode: in Mode Listen nothing may be sent on'):
         Client.from_files(*files(
             tmp_path, '/dev/none', 'Tag,Command,Address,Station,PLC_Type,Period\n'

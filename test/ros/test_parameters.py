@@ -363,6 +363,7 @@ def test_bad_row_is_left_out_unless_the_map_is_strict(make_node: Nodes, files: F
     bad, ours = map(str, configuration.map_problems)
     assert '2501 ERR_BAD_STATION: Item: 1, ' in bad and 'Station 5 is our own Station' in ours
     assert problems_of(make_node(files | {'strict_map': True})) == [bad, ours]
+    assert problems_of(make_node(files | {'default_period': -1}))[1:] == [bad, ours]
 
 
 def test_mappings_are_shown_with_their_defaults(configured: Configured) -> None:

@@ -282,8 +282,8 @@ def _from_files(given: Given, parameters: Parameters, problems: list[Problem], *
             port, network = other.port, replace(network, remarks=other.remarks)
         except ConfigurationError as error:
             problems += error.problems
-    if problems:
-        raise ConfigurationError(problems)
+    if problems:  # all that is wrong, as the node does not begin
+        raise ConfigurationError(problems if is_strict else [*problems, *map_problems])
     return Configuration(parameters, network, port, mappings, map_problems, given, polling,
                          _ignored(given, mappings), files)
 
