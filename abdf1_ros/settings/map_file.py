@@ -29,6 +29,7 @@ from abdf1_ros.settings.csv_table import read_table, Row
 from abdf1_ros.settings.heartbeats import counts, READS_IN_TIME, RUN
 from abdf1_ros.settings.map_row import CellFault, RowReader
 from abdf1_ros.settings.mapping import Command, Mapping
+from abdf1_ros.settings.names import sanitise
 from abdf1_ros.settings.rows import Rows
 from abdf1_ros.settings.shared_words import SharedWords
 from abdf1_ros.text import shown
@@ -61,8 +62,9 @@ def load_mappings(path: str) -> tuple[Rows, list[Problem]]:
     for row in table.rows:
         reader = RowReader(row)
         mapping = reader.read()
-        faults = [*reader.faults, *_unknown_counter(row, reader.faults, tags)] \
-            if mapping is None else clashes.add(mapping)
+        faults = clashes.names(row)
+        faults += [*reader.faults, *_unknown_counter(row, reader.faults, tags)] \
+            if mapping is None else clashes.add(mapping, is_named=not faults)
         if mapping is not None and not faults:
             mappings.append(mapping)
             kept[mapping.item] = row
@@ -214,7 +216,7 @@ class _Clashes:
     """Find rows that clash with rows before them; each fault names both rows."""
 
     def __init__(self) -> None:
-        self._names: dict[str, Mapping] = {}
+        self._names: dict[str, Row] = {}  # also of rows that have faults
         self._readers: dict[str, Mapping] = {}
         self._writers: dict[str, Mapping] = {}
         self._slcs: dict[int, Mapping] = {}
@@ -223,8 +225,22 @@ class _Clashes:
         self._routed: dict[int, Mapping] = {}
         self._gateways: dict[int, Mapping] = {}
 
-    def add(self, mapping: Mapping) -> list[CellFault]:
-        """Return the clashes of ``mapping``; if there are none, remember it for later rows."""
+    def names(self, row: Row) -> list[CellFault]:
+        """Return the clash of the tag of ``row``, which may have other faults; remember it."""
+        tag, name = row.get('Tag'), sanitise(row.get('Tag'))
+        if not name or (other := self._names.setdefault(name, row)) is row:
+            return []
+        same = 'is already the tag' if tag == other.get('Tag') else f'becomes "{name}", the name'
+        return [CellFault('Tag', f'tag "{shown(tag)}" {same} of item {other.item} '
+                                 f'(line {other.line}, tag "{shown(other.get("Tag"))}")')]
+
+    def add(self, mapping: Mapping, is_named: bool) -> list[CellFault]:
+        """
+        Return the clashes of ``mapping``; if there are none, remember it for later rows.
+
+        Without ``is_named`` its tag has a fault: a topic named after the tag is not reported
+        again.
+        """
         faults: list[CellFault] = []
 
         def clash(column: str, other: Mapping, text: str) -> None:
@@ -232,15 +248,10 @@ class _Clashes:
                 f'{text} of item {other.item} (line {other.place.line}, tag '
                 f'"{shown(other.tag)}")')))
 
-        if other := self._names.get(mapping.name):
-            same = 'is already the tag' if mapping.tag == other.tag \
-                else f'becomes "{mapping.name}", the name'
-            clash('Tag', other, f'tag "{shown(mapping.tag)}" {same}')
-        # If the tag has a fault, a topic named after the tag is not reported again.
-        is_named = not faults or mapping.topic != mapping.name
-        if is_named and mapping.reads and (other := self._readers.get(mapping.topic)):
+        is_told = is_named or mapping.topic != mapping.name
+        if is_told and mapping.reads and (other := self._readers.get(mapping.topic)):
             clash('Topic', other, f'read topic "{mapping.topic}" is the topic')
-        if is_named and mapping.writes and (other := self._writers.get(mapping.topic)) \
+        if is_told and mapping.writes and (other := self._writers.get(mapping.topic)) \
                 and (other.message_type, other.length) != (mapping.message_type, mapping.length):
             clash('Topic', other, f'write topic "{mapping.topic}" needs the message type '
                                   f'({other.message_type.value}) and Length ({other.length})')
@@ -252,12 +263,11 @@ class _Clashes:
                                       f'here, but {names[1]} in the row')
         self._check_route(mapping, clash)
         self._check_words(mapping, clash)
-        if not faults:
+        if is_named and not faults:
             if mapping.changes:
                 self._changing.add(mapping)
                 if mapping.is_alone:
                     self._alone.add(mapping)
-            self._names[mapping.name] = mapping
             if not mapping.serves:
                 self._routed.setdefault(mapping.station, mapping)
             if mapping.via is not None:

@@ -49,13 +49,26 @@ def test_bad_row_is_left_out_and_the_rest_stays() -> None:
     assert 'Item: 4, ' in str(problems[1])
 
 
-def test_row_that_clashes_counts_for_nothing() -> None:
+@for_all(('first', 'second'), [
+    ({'Period': '1s'}, {'Address': 'N7:5'}), ({'Topic': 'a'}, {}), ({'Tag': 'b.'}, {'Min': '?'}),
+    ({'Length': '0'}, {'Station': 'x'})])
+def test_tag_of_a_bad_row_is_no_tag_of_a_later_row(
+        first: dict[str, str], second: dict[str, str]) -> None:
+    first, second = ({'Tag': 'b', 'Topic': ''} | cells for cells in (first, second))
+    mappings, problems = load_rows(row(Tag='a', Topic='a'), row(**first), row(**second))
+    said = [str(problem) for problem in problems if '4:1 (Tag)' in str(problem)]
+    assert [text.partition(', tag')[0].partition(': ')[2] for text in said] == ['Item: 3']
+    assert 'of item 2 (line 3, tag "b' in said[0]
+    assert [mapping.tag for mapping in mappings] == ['a'] + ['b.'] * ('b.' in first.values())
+
+
+def test_row_that_clashes_has_no_topic_and_no_words() -> None:
     mappings, problems = load_rows(
-        row(Tag='a'), row(Tag='b', Topic='a'), row(Tag='b', Topic='c'),
+        row(Tag='a'), row(Tag='b', Topic='a'), row(Tag='c', Topic='c'),
         row(Tag='a', Command='Heartbeat', Address='N7:9'),
         row(Tag='d', Command='Write', Address='N7:9'))
     assert [(mapping.tag, mapping.topic) for mapping in mappings] == [
-        ('a', 'a'), ('b', 'c'), ('d', 'd')]
+        ('a', 'a'), ('c', 'c'), ('d', 'd')]
     assert len(problems) == 2
 
 
