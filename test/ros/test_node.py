@@ -638,6 +638,15 @@ def test_unusable_arguments_are_told_in_one_line(
     assert 'Traceback' not in ' '.join(lines)
 
 
+def test_file_of_parameters_without_ros_parameters_is_told_its_first_lines(
+        refusal: Callable[..., list[str]], tmp_path: Path) -> None:
+    file = tmp_path / 'parameters.yaml'
+    file.write_text('abdf1:\n  net_file: net.csv\n')
+    assert refusal('--ros-args', '--params-file', str(file))[0].startswith(
+        'abdf1: bad arguments: a file of parameters begins with the lines "/**:" and '
+        '"  ros__parameters:"; ')
+
+
 @pytest.mark.parametrize(('option', 'hint'), [
     ('--log-lvl', '; did you mean --log-level?'),
     ('--params-flie', '; did you mean --params-file?'),

@@ -51,6 +51,8 @@ _ADVICE = (
     (r"parameter override rule: '-p \w+=", 'a parameter is NAME:=VALUE, with a colon; '),
     (r"override rule: '-p [\w.]+:=\[", 'put quotes around a text with [ or :; '),
     (r"^\['--?[hv]", 'write this before --ros-args: '),
+    ('Cannot have a value before ros__parameters', 'a file of parameters begins with the lines '
+     '"/**:" and "  ros__parameters:"; '),
     (r'log level:', 'a level is debug, info, warn, error or fatal, for one logger NAME:=LEVEL; '),
     (r'remap rule: .*__ns:=/|invalid node namespace: (?!.*should not exceed)',
      'a namespace has names of letters, digits and underscores, each after one "/", and no "/" at '
