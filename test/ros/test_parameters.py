@@ -140,6 +140,8 @@ def test_one_line_tells_what_the_node_runs_with(configured: Configured, files: F
     assert str(configured(port='/dev/ttyUSB0')) == (
         f'{files["net_file"]} and {files["map_file"]}: port /dev/ttyUSB0, Mode Master, 9600 '
         'baud, CRC; 3 rows, topics: 2 to read, 1 to write')
+    assert 'port /dev/ttyS6 (Com_Port 7), Mode' in str(configured(port=7))
+    assert 'port /dev/ttyS2 (Com_Port 3), Mode' in str(configured())  # of the file
 
 
 def test_no_path_and_no_port_forges_a_line_of_the_log(

@@ -27,7 +27,7 @@ from typing import Any, TypeVar
 from abdf1_ros.df1.polling import STANDARD
 from abdf1_ros.df1.settings import PollingSettings
 from abdf1_ros.driver.settings import DriverSettings
-from abdf1_ros.numbers import Checked
+from abdf1_ros.numbers import Checked, is_digits
 from abdf1_ros.paths import config_file, expanded
 from abdf1_ros.plan.forecast import USUAL_STALE_AFTER
 from abdf1_ros.plan.usable_rows import usable_rows
@@ -206,7 +206,9 @@ class Configuration:
         written = len({mapping.topic for mapping in self.mappings.messages})
         files = f'{_resolved(parameters.net_file)} and {_resolved(parameters.map_file)}'
         rows = counted(len(self.mappings), 'row')
-        return (f'{printable(files)}: port {printable(self.port)}, Mode {network.mode}, '
+        given = parameters.port or network.com_port
+        number = f' (Com_Port {given})' if is_digits(given) else ''
+        return (f'{printable(files)}: port {printable(self.port)}{number}, Mode {network.mode}, '
                 f'{network.baud} baud, {network.error_code}; {rows}, topics: {read} to read, '
                 f'{written} to write')
 
