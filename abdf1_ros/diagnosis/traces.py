@@ -32,8 +32,8 @@ from abdf1_ros.sniffer.entries import Entry, Kind, Mark
 from abdf1_ros.sniffer.traffic import TrafficDecoder
 from abdf1_ros.text import counted, printable
 
-# Number of polls and messages that show another master. One is not enough: after DLE ENQ, one of
-# 256 random byte pairs has a right BCC.
+# Number of polls and messages that show another master, if we poll as well. One is not enough:
+# after DLE ENQ, one of 256 random byte pairs has a right BCC.
 SURE = 2
 
 MOST_FIRST = 256
@@ -211,6 +211,7 @@ class _SymbolCount:
         self._masters: Counter[int] = Counter()
         self._asked: Kind | None = None  # what we have sent last
         self._asked_station: int | None = None
+        self._has_polled = False
         self._foreign: int | None = None
         self._source: int | None = None
         self._late = 0.0
@@ -228,7 +229,8 @@ class _SymbolCount:
         for entry in decoder.finish():
             self._take(entry)
         counts: dict[str, Any] = self._counts
-        has_masters = asked.mode.is_master and self._masters.total() >= SURE
+        has_masters = asked.mode.is_master and self._masters.total() >= (
+            SURE if self._has_polled else 1)
         self.traces = replace(
             asked, characters=characters, first=first, unasked=unasked, late=self._late,
             foreign=self._foreign, other_source=self._source, echoes=echoes,
@@ -240,6 +242,7 @@ class _SymbolCount:
         if entry.direction is Direction.OUT:
             if entry.kind in (Kind.POLL, Kind.COMMAND, Kind.REPLY, Kind.ENQ):
                 self._asked, self._asked_station = entry.kind, entry.station
+                self._has_polled |= entry.kind is Kind.POLL
                 self._counts['polls'] += entry.kind is Kind.POLL and self._of.is_of(entry.station)
         elif entry.direction is Direction.IN:
             self._hear(entry)

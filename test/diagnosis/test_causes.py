@@ -87,6 +87,9 @@ def test_polls_and_messages_of_another_master_are_known_by_their_direction() -> 
     polls = ('>', poll(1)), ('<', EOT), ('<', poll(2)), ('<', frame(COMMAND, 1))
     assert names(seen(*polls), 'masters', 'foreign_polls', 'polls_answered') == ((1, 2), 2, 1)
     assert seen(*polls[:3]).masters == ()  # noise may look like a single one
+    unasked = seen(('>', frame(COMMAND, 2)), ('<', poll(2)), ('<', EOT), station=2)
+    assert unasked.masters == (2,)  # we have sent no poll, so a slow master may have sent one
+    assert diagnose(unasked).cause.startswith('another master polls station 2 of this line')
     assert seen(('<', poll(5)), mode=SLAVE).polled and not seen(('<', poll(3)), mode=SLAVE).polled
 
 
