@@ -35,6 +35,7 @@ from typing import Any, NoReturn, TextIO
 from abdf1_ros.errors import PortLost
 from abdf1_ros.numbers import decimal_number, whole_number
 from abdf1_ros.paths import as_called, expanded, ShowVersion
+from abdf1_ros.ports.ownership import BUSY
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.hints import pasted
 from abdf1_ros.signals import drop, has_no_reader, limit_output
@@ -210,6 +211,8 @@ def reason_of(name: str, error: OSError) -> str:
     text = error.strerror or str(error)
     settings = _SETTINGS_AFTER.fullmatch(name)
     advice = f'a speed is given as --baud {settings[1]}' if settings else \
+        f'"fuser -v {name}" shows the program; end it, or let a bridge release the port by ' \
+        '~/polling with false' if text == BUSY and '://' not in name else \
         ADVICE.get(error.errno, '') if name.startswith('/dev/') else \
         f'a device path is /dev/{name}' if name.startswith('tty') else ''
     return (text if name in text else f'{name}: {text}') + (

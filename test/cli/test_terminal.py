@@ -268,6 +268,15 @@ def test_port_that_cannot_be_opened_leads_to_the_cure(number: int, text: str) ->
     assert text not in terminal.reason_of('net.csv', error)
 
 
+@pytest.mark.parametrize(('name', 'is_told'), [
+    ('/dev/ttyUSB0', True), ('/tmp/plc', True), ('socket://10.0.0.5:4001', False)])
+def test_program_that_has_the_port_can_be_found(name: str, is_told: bool) -> None:
+    told = terminal.reason_of(name, OSError(errno.EBUSY, 'another program has it open'))
+    assert told == f'{name}: another program has it open' + (
+        f'; "fuser -v {name}" shows the program; end it, or let a bridge release the port by '
+        '~/polling with false') * is_told
+
+
 @pytest.mark.parametrize(('name', 'advice'), [
     ('/dev/ttyUSB0:19200', '--baud 19200'), ('/dev/ttyS1,9600,n,8,1', '--baud 9600'),
     ('/dev/pts/12', 'plc ports')])

@@ -27,7 +27,7 @@ import time
 from typing import TypeAlias
 
 from abdf1_ros.cli.plc.session import complain, Session
-from abdf1_ros.cli.terminal import EXIT_FAILED, EXIT_UNKNOWN
+from abdf1_ros.cli.terminal import EXIT_FAILED, EXIT_UNKNOWN, is_port
 from abdf1_ros.driver.write import Outcome, show, Write, WriteResult
 from abdf1_ros.driver.writes.packets import carry_out
 from abdf1_ros.errors import Abdf1Error, FormatError, LinkError, PortLost, RemoteError
@@ -173,11 +173,13 @@ def _meant(address: str) -> str:
     """Return what a user may have meant by a bad address."""
     if address.isdigit():
         return f'; a station is given with --station {address}'
+    if is_port(address):
+        return f'; a port is given with --port {address}'
+    if re.fullmatch('COM[0-9]+', address, re.IGNORECASE):
+        return '; a port is given with --port, as in --port /dev/ttyUSB0'
     parts = re.split('[,; ]+', address.strip(',; '))
     if len(parts) > 1 and all(map(looks_like_address, parts)):
         return f'; several addresses stand apart: {" ".join(parts)}'
-    if address.isidentifier() and ('_' in address or address.isalpha()):
-        return '; a tag needs --map FILE'
     return ''
 
 

@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
@@ -38,7 +38,7 @@ from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.rows import Rows
 from abdf1_ros.text import first, printable, shown
 
-_LIKE_A_TAG = re.compile(r'(?![A-Z]{1,3}\d*$)[A-Z_][\w/.]*', re.ASCII | re.IGNORECASE)
+_LIKE_A_TAG = re.compile(r'(?![A-Z]{1,2}\d*$|[A-Z]{3}\d+$)[A-Z_][\w/.]*', re.ASCII | re.IGNORECASE)
 
 # Options for addresses; a row of a map has a column for each.
 _FOR_ADDRESSES = ('length', 'type', 'word_order', 'access', 'processor', 'plc_type', 'via')
@@ -102,8 +102,7 @@ def to_read(options: argparse.Namespace) -> Targets:
     try:
         data.check_for_some_family(targets.addresses, cells)
     except ConfigurationError as error:
-        hints = [Problem('--map', f'if {shown(word)} is a tag, give its map with --map FILE')
-                 for word in targets.addresses if _LIKE_A_TAG.fullmatch(word)]
+        hints = _tag_hints(targets.addresses)
         if options.map:
             hints = [Problem(options.map, (
                 f'tags that are read: {first(list(rows)) or "none"}'
@@ -125,9 +124,17 @@ def to_write(options: argparse.Namespace) -> Targets:
         return targets
     cells = _cells(options, Command.READ_WRITE,
                    data.length_of(options.address, options.type, options.values))
-    with no_value(options.address):
-        data.check_for_some_family([options.address], cells, options.values)
+    try:
+        with no_value(options.address):
+            data.check_for_some_family([options.address], cells, options.values)
+    except ConfigurationError as error:
+        raise ConfigurationError([*error.problems, *_tag_hints([options.address])]) from None
     return Targets([options.address], cells)
+
+
+def _tag_hints(words: Iterable[str]) -> list[Problem]:
+    return [Problem('--map', f'if {shown(word)} is a tag, give its map with --map FILE')
+            for word in words if _LIKE_A_TAG.fullmatch(word)]
 
 
 def rows_of_map(path: str | None) -> Rows:

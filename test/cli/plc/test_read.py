@@ -63,7 +63,7 @@ def test_read_shows_address_and_values(
     (('N7:0,N7:1',), '; several addresses stand apart: N7:0 N7:1'),
     (('N7:0;N7:1',), '; several addresses stand apart: N7:0 N7:1'),
     (('N7:0 B3:0/1',), '; several addresses stand apart: N7:0 B3:0/1'),
-    (('line_speed',), '; a tag needs --map FILE'), (('N7',), ''),
+    (('line_speed',), 'if line_speed is a tag, give its map'), (('N7',), ''),
     (('N7:0,x',), ''), (('--csv', 'N7:0'), 'plc read: error: "plc watch --csv --count 1" prints '
                         'values for programs'),
     (('N7:0', '--format', 'json'), 'plc read: error: "plc log --format jsonl --count 1" prints '
@@ -76,7 +76,7 @@ def test_mistaken_words_lead_to_the_right_ones(
                 '--plc-type', 'SLC')  # of a PLC-2 a number is an address
     assert said.status == 2 and hint in said.err
     assert bool(hint) == any(
-        lead in said.err for lead in ('; a station', 'apart', '"plc ', '; a tag'))
+        lead in said.err for lead in ('; a station', 'apart', '"plc ', ' is a tag'))
 
 
 def test_read_shows_rows_with_their_addresses(plc: Plc) -> None:

@@ -197,11 +197,21 @@ def test_write_that_does_not_fit_the_family_of_the_plc(plc: Plc) -> None:
     (('watch', 'line_speed'), 'ADDRESS "line_speed": write type, file, ":", element, as in N7:0, '
                               'B3:1/5, T4:0.ACC or I:1.0/3\nplc: --map: if line_speed is a tag, '
                               'give its map with --map FILE'),
+    (('read', 'N7:0', '/dev/ttyUSB0'),
+     'ADDRESS "/dev/ttyUSB0": write type, file, ":", element, as in N7:0, B3:1/5, T4:0.ACC or '
+     'I:1.0/3; a port is given with --port /dev/ttyUSB0'),
+    (('read', 'N7:0', 'COM1', '--plc-type', 'PLC5'),
+     'ADDRESS "COM1": PLC-5 has no COM files; file types: O, I, S, B, T, C, R, N, F, ST, A, D, '
+     'PD, MG, BT, SC; a port is given with --port, as in --port /dev/ttyUSB0'),
     (('write', 'N7:0', '=', '5'), 'N7:0: "=" is not a valid int16, a whole number from -32768 to '
      '32767; the values follow the address without it'),
     (('write', 'N7:0', '1000', 'N7:1=2'),
      'N7:0: "N7:1=2" is not a valid int16, a whole number from -32768 to 32767; a write has one '
      'address, and the values of the places after it follow'),
+    (('write', 'cmd', '5', '--plc-type', 'SLC'),
+     'ADDRESS "cmd": SLC has no CMD files; file types: O, I, S, B, T, C, R, N, F, ST, A, D, L, '
+     'PD, MG, HSC, PTO, PWM, STI, EII\n'
+     'plc: --map: if cmd is a tag, give its map with --map FILE'),
     (('write', 'B3:0/1=on'), 'B3:0/1: "on" is not a valid bool, 0 or 1'),
     (('read', 'N7:0', 'B3:O'), 'ADDRESS "B3:O": that is the letter O where a digit should be; '
                                'write B3:0'),
