@@ -77,6 +77,7 @@ from abdf1_ros.sniffer.entries import Entry
 from abdf1_ros.sniffer.ethernet_ip import DEVICE_SERVERS
 from abdf1_ros.sniffer.pcapng import PcapngWriter
 from abdf1_ros.sniffer.report import json_line, summary_json, summary_lines, text_line
+from abdf1_ros.sniffer.sides import Heard, merged, two_sides
 from abdf1_ros.sniffer.summary import MISSING, Summary
 from abdf1_ros.sniffer.texts import TextProblem
 from abdf1_ros.sniffer.traffic import TrafficDecoder
@@ -397,14 +398,14 @@ def _decode_files(options: argparse.Namespace, output: Output) -> int:
 def _take_files(options: argparse.Namespace, output: Output) -> None:
     """Take the bytes of all files, for ``seconds`` at most."""
     end = time.monotonic() + options.seconds
-    for name in options.files:
-        has_bytes = False
-        for recording, chunk in _recorded(name, options):
+    for name, heard in _sources(options):
+        known: set[str] = set()
+        for recording, chunk in heard:
             if time.monotonic() >= end:
                 return
-            if recording.told and not has_bytes:
-                _say(f'{name}: {recording.told}')
-            has_bytes = True
+            if recording.told and recording.name not in known:
+                _say(f'{recording.name}: {recording.told}')
+            known.add(recording.name)
             if lost := recording.settings.pop(LOST, ''):
                 _say(f'{name}: the recorder has lost lines before {chunk.time} s: {lost}. '
                      'Faults of the line there may be no faults')
@@ -412,15 +413,31 @@ def _take_files(options: argparse.Namespace, output: Output) -> None:
             if output.is_unread and not (options.html or options.report or options.pcapng):
                 return
             output.show_progress(f'{name}: {recording.percent} %' if recording.has_size else name)
-        if not has_bytes:
+        if not known:
             _say(f'{name}: the file has no bytes')
 
 
-def _recorded(name: str, options: argparse.Namespace) -> Iterator[tuple[Recording, Chunk]]:
+def _sources(options: argparse.Namespace) -> Iterator[tuple[str, Iterator[Heard]]]:
+    """Yield the name and the chunks of each file, or of two files with one side each."""
+    opened = partial(_opened, options)
+    pair = two_sides(options.files, opened)
+    if pair:
+        name = ' and '.join(pair)
+        _say(f'{name}: one side of the line each, put together by their times')
+        yield name, merged(pair, opened)
+        return
+    for name in options.files:
+        yield name, _recorded(name, options)
+
+
+def _opened(options: argparse.Namespace, name: str) -> Recording:
+    return Recording(Path(name), options.binary, frozenset(options.tcp or DEVICE_SERVERS))
+
+
+def _recorded(name: str, options: argparse.Namespace) -> Iterator[Heard]:
     """Yield the chunks of a file."""
-    servers = frozenset(options.tcp or DEVICE_SERVERS)
     try:
-        recording = Recording(Path(name), options.binary, servers)
+        recording = _opened(options, name)
         for chunk in recording.chunks():
             yield recording, chunk
     except OSError as error:

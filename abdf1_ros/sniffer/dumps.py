@@ -53,7 +53,8 @@ class Recording:
     The chunks of a file; ``settings`` has the settings of a capture, as far as it has been read.
 
     ``servers`` are the TCP ports of device servers. ``told`` says how the text of another program
-    is read. ``has_size`` tells whether the file has a known size; a pipe or device has none.
+    is read, and ``begun`` is its first time in seconds. ``has_size`` tells whether the file has a
+    known size; a pipe or device has none.
     Raises OSError if the file cannot be opened.
     """
 
@@ -61,10 +62,11 @@ class Recording:
                  servers: frozenset[int] = DEVICE_SERVERS) -> None:
         self.settings: dict[str, str] = {}
         self.told = ''
+        self.begun: float | None = None
         self._size = path.stat().st_size
         self.has_size = self._size > 0
         self._position = 0
-        self._name = str(path)
+        self.name = str(path)
         self._is_binary, self._servers = is_binary, servers
         file = path.open('rb')
         is_packed = not is_binary and file.peek(2).startswith(_GZIP)
@@ -80,7 +82,7 @@ class Recording:
         try:
             yield from self._chunks()
         except (EOFError, zlib.error, BadGzipFile) as error:
-            raise Problem(self._name, f'damaged gzip file: {error}') from None
+            raise Problem(self.name, f'damaged gzip file: {error}') from None
 
     def _chunks(self) -> Iterator[Chunk]:
         with self._file:
@@ -99,36 +101,36 @@ class Recording:
             head.append(next(lines, ''))
         lines = chain(head, lines)
         if is_head_of_settings(head[-1]):
-            raise TextProblem(f'{self._name}:1', 'the settings of a line, or the rows of a map, '
-                                                 'and no bytes: "check" reads them')
+            raise TextProblem(f'{self.name}:1', (
+                'the settings of a line, or the rows of a map, and no bytes: "check" reads them'))
         if is_head_of_values(begin):
-            raise TextProblem(f'{self._name}:1', 'values, not bytes: "plc plot" draws them')
+            raise TextProblem(f'{self.name}:1', 'values, not bytes: "plc plot" draws them')
         if is_capture_line(begin):
-            yield from read_capture(self._name, lines, self.settings)
+            yield from read_capture(self.name, lines, self.settings)
             return
-        reader = TextReader(self._name)
+        reader = TextReader(self.name)
         for chunk in reader.chunks(lines):
-            self.told = reader.told
+            self.told, self.begun = reader.told, reader.begun
             yield chunk
 
     def _packets(self) -> Iterator[Chunk]:
-        file = PacketFile(self._name, cast(BinaryIO, self._file))
+        file = PacketFile(self.name, cast(BinaryIO, self._file))
         is_empty, seen = True, SeenPackets(self._servers)
         try:
             for chunk in chunks_of(file.packets(), seen):
                 is_empty, self._position = False, file.position
                 yield chunk
         except ValueError as error:
-            raise Problem(self._name, f'byte {file.position}: {error}') from None
+            raise Problem(self.name, f'byte {file.position}: {error}') from None
         if seen.cut:
-            raise Problem(self._name, (
+            raise Problem(self.name, (
                 f'{counted(len(seen.cut), "packet")} cut by the recorder, at {max(seen.cut)} '
                 'bytes: what was in them is missing; record whole packets, as "tcpdump -s 0" '
                 'does'))
         if is_empty:
             csp = f'; TCP port {CSP} is CSP, which is not decoded' if CSP in seen.ports else ''
             others = first([str(port) for port in sorted(seen.ports - {CSP})])
-            raise Problem(self._name, (
+            raise Problem(self.name, (
                 f'byte {file.position}: no packet up to here has DF1 (link type {LINK_TYPE}, a '
                 'device server, or USB) or PCCC in EtherNet/IP (CIP service 4B)' + csp + (
                     f'; seen are TCP ports {others}: give that of a device server with --tcp'
@@ -150,10 +152,10 @@ class Recording:
             self._position += len(line) * (2 if encoding else 1)
             text = line if isinstance(line, str) else _decoded(line)
             if 10 * sum(map(text.count, _CONTROLS)) > 3 * len(text):
-                raise Problem(f'{self._name}:{number}',
+                raise Problem(f'{self.name}:{number}',
                               'this is not text; for a file of raw bytes give --binary')
             if len(line) > _LONGEST_LINE:
-                raise Problem(f'{self._name}:{number}', (
+                raise Problem(f'{self.name}:{number}', (
                     f'the line is longer than {_LONGEST_LINE // 1_000_000} MB; divide it, or for '
                     'a file of raw bytes give --binary'))
             yield text.rstrip('\r\n')

@@ -90,6 +90,7 @@ class _TextReading:
     hint: bool = False
     layout_words: str = ''
     remarks: list[str] = field(default_factory=list)
+    clock: TextClock = field(default_factory=TextClock)
 
     def pieces(self, line: str) -> list[Piece]:
         """Return the pieces of a line; raise ValueError if it does not fit."""
@@ -111,7 +112,8 @@ class _TextReading:
 
         What a dump has left out is repeated ``most`` times.
         """
-        clock, way, time, number = TextClock(), Direction.UNKNOWN, None, 0
+        self.clock = clock = TextClock()
+        way, time, number = Direction.UNKNOWN, None, 0
         for number, line in lines:
             try:
                 pieces = self.pieces(line)
@@ -225,12 +227,14 @@ class TextReader:
     """
     Read a text; ``told`` says how, as soon as the first chunk has come.
 
+    ``begun`` is then the first time of the text in seconds, None without times.
     ``chunks`` raises Problem, with the line, if a line does not fit, and if a text that is not
     empty has no bytes.
     """
 
     def __init__(self, name: str) -> None:
         self.told = ''
+        self.begun: float | None = None
         self._name = name
 
     def chunks(self, lines: Iterator[str]) -> Iterator[Chunk]:
@@ -259,6 +263,8 @@ class TextReader:
         rest = ((number, line) for number, line in enumerate(lines, len(sample) + 1))
         try:
             for _, chunk in best.chunks(chain(sample, rest)):
+                if self.begun is None:
+                    self.begun = best.clock.begun
                 yield chunk
         except _Stop as stop:
             raise stop.problem(self._name) from None

@@ -147,6 +147,31 @@ def test_how_a_log_is_read_is_told_and_a_bad_line_ends_it_without_summary(
     assert captured.out == ''
 
 
+def test_logs_of_one_side_each_are_put_together_by_their_times(
+        capsys: Output, tmp_path: Path) -> None:
+    asks = ['100101100201050F00EEFE680000040006070004001003E24E', '100501FF', '1006']
+    answers = ['1006', '100205014F00EEFE99090942D5002D030000000010035AC6']
+    sent, received = tmp_path / 'sent.log', tmp_path / 'received.log'
+    # Within each second all has the same time.
+    sent.write_text(''.join(f'[06:00:0{second}.001] {data}\n' for second in range(3)
+                            for data in asks), 'ascii')
+
+    def receive(hour: str) -> None:
+        received.write_text(''.join(f'{hour}:00:0{second}.001] {data}\n' for second in range(3)
+                                    for data in answers), 'ascii')
+    receive('[06')
+    for names in ((sent, received), (received, sent)):
+        assert [line.split()[1:4:2] for line in lines_of(capsys, *map(str, names))[:5]] == [
+            ['>', 'command'], ['<', 'ACK'], ['>', 'poll'], ['<', 'reply'], ['>', 'ACK']]
+        said = lines_of(capsys, '--summary', *map(str, names))
+        assert said[0].startswith('summary: 2.0 s')
+        assert '  seen: 3 commands, 3 replies, 3 polls, 6 ACK' in said
+        assert not any('without' in line for line in said)
+    receive('[07')
+    assert 'one side of the line each, without a common time' in refused(
+        capsys, str(sent), str(received))
+
+
 def test_port_of_a_device_server_is_an_option(capsys: Output) -> None:
     path = str(Path(__file__).parents[1] / 'sniffer/forms/moxa_4001.pcap')
     for options in ([], ['--tcp', '4001'], ['--tcp', '950', '--tcp', '4001']):
