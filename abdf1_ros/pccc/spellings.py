@@ -29,8 +29,12 @@ _OTHERS = (
         'a Logix controller has only the addresses of its "Map PLC/SLC Messages" here: choose SLC '
         'or PLC5 for them; libplctag and pycomm3 read its tags')),
     (re.compile('MICRO8.*|2080.*'), 'a Micro800 has no DF1 commands; it has Modbus RTU'))
-_MICROLOGIX = re.compile(r'(?:MICROLOGIX|ML)?(1[0-5]00)', re.IGNORECASE)
+_MICROLOGIX = re.compile(r'(?:MICROLOGIX|MLX?)?-?(1[0-5]00)', re.IGNORECASE)
 _SLC = re.compile(r'(?:SLC-?)?5(?:[/-]0?|0)([1-5])', re.IGNORECASE)
+# The family of catalog numbers of processors, such as 1747-L532 and 1766-L32BXB.
+_CATALOG = re.compile(r'(?:1747-?L5([1-5])\w*|(176[1-46])(?:-?L\w*)?)', re.IGNORECASE)
+_MICROLOGIX_OF = {'1761': 'ML1000', '1762': 'ML1200', '1763': 'ML1100', '1764': 'ML1500',
+                  '1766': 'ML1400'}
 _TYPES = {'int': 'int16', 'word': 'uint16', 'dint': 'int32', 'long': 'int32', 'dword': 'uint32',
           'real': 'float32', 'float': 'float32', 'bit': 'bool'}
 
@@ -49,8 +53,10 @@ def family_advice(text: str) -> str:
 
 
 def processor_name(text: str) -> str:
-    """Return the Processor for a name such as MicroLogix 1400 or SLC 5/3, or the text itself."""
+    """Return the Processor for a name such as SLC 5/3 or 1766-L32BXB, or the text itself."""
     name = text.replace(' ', '')
+    if match := _CATALOG.fullmatch(name):
+        return _MICROLOGIX_OF[match[2]] if match[2] else f'5/0{match[1]}'
     if match := _MICROLOGIX.fullmatch(name):
         return f'ML{match[1]}'
     return f'5/0{match[1]}' if (match := _SLC.fullmatch(name)) else text

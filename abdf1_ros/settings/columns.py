@@ -162,7 +162,8 @@ MAP_COLUMNS = (
     Column('Station', None,
            '0-254; Write: also 255 for all stations, but no station confirms; Serve: our own '
            'Station'),
-    Column('PLC_Type', None, 'PLC2, PLC3, PLC5 or SLC; a MicroLogix is SLC'),
+    Column('PLC_Type', None, 'PLC2, PLC3, PLC5 or SLC; a MicroLogix is SLC; a model such as '
+           'MicroLogix 1400 is its Processor, too'),
     Column('Length', '1; the size of a range',
            'number of elements: bits, words, floats; timers, counters, control and strings in N '
            'or A files: number of words',

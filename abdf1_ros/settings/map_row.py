@@ -29,7 +29,7 @@ from abdf1_ros.pccc.address_range import AddressRange
 from abdf1_ros.pccc.families import FAMILIES, parse_range
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.processor import Processor
-from abdf1_ros.pccc.spellings import family_advice, family_name
+from abdf1_ros.pccc.spellings import family_advice, family_name, processor_name
 from abdf1_ros.pccc.structures import bits_fault, order_fault, type_fault, write_fault, wrong_type
 from abdf1_ros.pccc.values import types_of, ValueType
 from abdf1_ros.problems import Problem
@@ -44,6 +44,7 @@ from abdf1_ros.settings.scaling import Scaling
 from abdf1_ros.text import counted, shown
 
 _PLC_TYPE_NAMES = tuple(entry.value for entry in FAMILIES)
+_PROCESSOR = member_of(Processor)
 
 _T = TypeVar('_T')
 
@@ -124,7 +125,7 @@ class RowReader:
         values: Checked = {
             'Tag': self._row.get('Tag'), 'Command': command, 'Station': station,
             'Via': self._via(station), 'PLC_Type': plc_type, 'Access': access,
-            'Address': address, 'Processor': self._processor(plc_type, address)}
+            'Address': address, 'Processor': self._processor(plc_type, address, command)}
         for column in self._given:
             if column.kind and column.name not in values and (
                     command is None or not column.why_not(command)):
@@ -230,12 +231,17 @@ class RowReader:
         """Tell whether a PLC may only read the words of a Serve row."""
         return command is Command.SERVE and self._row.get('Access').lower() == READ_ONLY.lower()
 
-    def _processor(self, plc_type: PlcType | None, address: Address | None) -> Processor | None:
+    def _processor(self, plc_type: PlcType | None, address: Address | None,
+                   command: Command | None) -> Processor | None:
+        """Return the cell Processor, or the model that PLC_Type names."""
         if plc_type and self._row.get('Processor') and not FAMILIES[plc_type].by_processor:
             self._fault('Processor', 'Processor is for PLCs of type SLC that we read or write',
                         is_superfluous=True)
             return None
-        processor = self._value('Processor', member_of(Processor))
+        processor = self._value('Processor', _PROCESSOR)
+        if plc_type and FAMILIES[plc_type].by_processor and command is not Command.SERVE \
+                and not self._row.get('Processor'):
+            processor = _PROCESSOR.read(processor_name(self._row.get('PLC_Type')))
         if processor and address and not processor.has_file(address.file, address.file_type):
             self._fault('Address', f'{processor.value} has no file {address.file_type.value}'
                                    f'{address.file}; {having(address)} may have it')

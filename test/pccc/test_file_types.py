@@ -223,7 +223,8 @@ def test_packet_has_an_element_at_least_so_that_a_plc_that_lacks_the_file_can_re
 @for_all(('text', 'family', 'processor'), [
     ('SLC 500', 'SLC', 'SLC 500'), ('5/03', 'SLC', '5/03'), ('SLC 5/3', 'SLC', '5/03'),
     ('slc-5/04', 'SLC', '5/04'), ('ML1400', 'SLC', 'ML1400'),
-    ('MicroLogix 1100', 'SLC', 'ML1100'), ('1747-L531', 'SLC', '1747-L531'),
+    ('MicroLogix 1100', 'SLC', 'ML1100'), ('1747-L531', 'SLC', '5/03'),
+    ('1763-L16BWA', 'SLC', 'ML1100'), ('1747-KE', 'SLC', '1747-KE'),
     ('PLC-5', 'PLC5', 'PLC-5'), ('PLC-5/40E', 'PLC5', 'PLC-5/40E'), ('5/40', 'PLC5', '5/40'),
     ('1785-L40B', 'PLC5', '1785-L40B'), ('plc2', 'PLC2', 'plc2'), ('S7', 'S7', 'S7'),
     ('SLC504', 'SLC', '5/04'), ('5/4', 'SLC', '5/04'), ('MLX', 'SLC', 'MLX'),

@@ -195,6 +195,25 @@ def test_families_and_types_have_the_names_of_the_field(
     assert (str(mapping.plc_type), mapping.type.value) == (meant, right)
 
 
+@for_all(('family', 'processor', 'expected'), [
+    ('MicroLogix 1400', '', Processor.ML1400), ('ML1100', '', Processor.ML1100),
+    ('MLX1200', '', Processor.ML1200), ('SLC 5/04', '', Processor.SLC_5_04),
+    ('1747-L532', '', Processor.SLC_5_03), ('1766-L32BXB', '', Processor.ML1400),
+    ('1761-L32BWA', '', Processor.ML1000), ('SLC 5/04', '5/05', Processor.SLC_5_05),
+    ('MicroLogix', '', None), ('SLC', '', None), ('PLC-5/40', '', None)])
+def test_model_in_plc_type_is_the_processor(
+        family: str, processor: str, expected: Processor | None) -> None:
+    assert one(PLC_Type=family, Processor=processor).processor is expected
+    served = one(PLC_Type=family, Command='Serve')
+    assert served.processor is None
+
+
+def test_file_of_the_model_in_plc_type_has_no_remark() -> None:
+    cells = {'Command': 'Read', 'Address': 'L9:0'}
+    assert one(PLC_Type='MicroLogix 1400', **cells).remarks == ()
+    assert '5/04 has no file L9; ML1100, ML1200, ML1400' in fault(PLC_Type='SLC 5/04', **cells)
+
+
 @for_all(('text', 'reads', 'writes'), [
     ('Read', True, False), ('Write', False, True), ('ReadWrite', True, True),
     ('READ', True, False), ('write', False, True), ('R/W', True, True), ('rw', True, True),
