@@ -40,12 +40,12 @@ _SET_BACK = 3600.0  # s; a time of day that is earlier by more than this is of t
 
 _OUT = ('tx txd sent send sends sending written write wrote writing irp_mj_write out output '
         'transmit transmitted request req cmd command query master host gesendet senden sende '
-        'envoyé enviado inviato отправлено 发 发送 > >> >>> -> --> => → ▶')
+        'envoyé enviado inviato отправлено 发 发送 > >> >>> -> --> => → ▶ »')
 _IN = ('rx rxd received receive receives recv rcvd receiving read reading irp_mj_read in input '
        'reply response resp answer slave empfangen empfange reçu recibido ricevuto получено '
-       '收 接收 < << <<< <- <-- <= ← ◀')
+       '收 接收 < << <<< <- <-- <= ← ◀ «')
 _WAYS = {**dict.fromkeys(_OUT.split(), Direction.OUT), **dict.fromkeys(_IN.split(), Direction.IN)}
-_ARROW = r'(?:[-=]*>+|<+[-=]*|[→←▶◀])'
+_ARROW = r'(?:[-=]*>+|<+[-=]*|[→←▶◀»«])'
 WORD = re.compile(rf'[^\W\d_]+(?:_[^\W\d_]+)*|{_ARROW}')
 # An arrow between two names says nothing alone: the names do.
 _BETWEEN = re.compile(rf'\w\S*\s*{_ARROW}\s*\w')

@@ -74,6 +74,8 @@ _PUTTY = ('a log of PuTTY: its "printable output" lacks the control characters o
 _SHOWN = 60  # characters of a line
 _HALF = re.compile(r'(?<!\w)[0-9A-Fa-f]{2}\s[0-9A-Fa-f]\Z')  # at the end of a line
 _COMMENT = re.compile(r'#(?!\d)|//')
+# The number of a line, as a forum or a list puts it before each.
+_LINE_NUMBER = re.compile(r'\s*(\d{1,6})[.)]\s+(?=\S)')
 
 
 @dataclass(slots=True)
@@ -248,6 +250,9 @@ class TextReader:
                 break
         if not any(line.strip() for _, line in sample):
             return
+        if _is_numbered(line for _, line in sample):
+            sample = [(number, _LINE_NUMBER.sub('', line, count=1)) for number, line in sample]
+            lines = (_LINE_NUMBER.sub('', line, count=1) for line in lines)
         if reason := _refused([line for _, line in sample]):
             raise TextProblem(self._name, reason)
         try:
@@ -277,6 +282,12 @@ def _refused(lines: Sequence[str]) -> str:
     if lines[0].startswith('=~=') and 'PuTTY log' in lines[0]:
         return _PUTTY
     return _PACKETS if shows_packets(lines) else ''
+
+
+def _is_numbered(lines: Iterable[str]) -> bool:
+    """Return True if lines have numbers that count up by one."""
+    numbers = [int(found[1]) for found in map(_LINE_NUMBER.match, lines) if found]
+    return len(numbers) > 2 and numbers == [*range(numbers[0], numbers[0] + len(numbers))]
 
 
 def _begin(line: str) -> str:

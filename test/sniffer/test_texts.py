@@ -541,6 +541,17 @@ def test_two_kinds_of_marks_are_two_directions(names: str, ways: str) -> None:
             ways[(way is IN) is not turned] if turned else ways[way is IN] for way, _ in said]
 
 
+@for_all('count', [8, 16, 80])
+def test_numbers_of_lines_and_their_alignment_are_neither_bytes_nor_marks(count: int) -> None:
+    said = (LONG * 10)[:count]
+    for form, names in ((' {:>2}. {} {}', '» «'), ('{}) {} {}', 'A: B:'), ('{:>4}. {}{}', '')):
+        ways = [UNKNOWN if not names else way for way, _ in said]
+        chunks = read(form.format(number, names and word(way, names), data.hex(' '))
+                      for number, (way, data) in enumerate(said, 1))
+        assert [*zip(ways, (data for _, data in said))] == [
+            (chunk.direction, chunk.data) for chunk in chunks]
+
+
 def test_three_kinds_of_marks_are_told_as_they_stand() -> None:
     reader = TextReader('x')
     lines = (f'{"ABC"[at % 3]}: {data.hex()}' for at, (_, data) in enumerate(LONG))
