@@ -241,3 +241,16 @@ def test_files_of_a_plc5_have_their_type_and_are_counted_to_their_end() -> None:
     next(steps := Plc5FileSearch().look_for(12))
     with pytest.raises(RemoteError, match='STS 02'):  # a gateway that has lost the PLC
         steps.send(Packet(1, 0, 0x4F, 2, 7))
+
+
+@for_all(('asked', 'kept', 'data', 'told'), [
+    ('N8:0', 'F8:0', '00 00 80 3F', 'file 8 of this PLC holds floats: write F8:0'),
+    ('F7:3', 'N7:3', '01 00', 'file 7 of this PLC holds no floats (type 4), so F7:3 is not there; '
+                              '"plc files" lists the files')])
+def test_wrong_file_letter_is_told_with_what_the_file_holds(
+        asked: str, kept: str, data: str, told: str) -> None:
+    element = element_of(parse_address(kept, PLC5), is_value=False)
+    reply = element.typed(bytes.fromhex(data)).encode()
+    with pytest.raises(FormatError) as caught:
+        DIALECT.read_data(parse_address(asked, PLC5), 1 if asked == 'N8:0' else 2, reply)
+    assert str(caught.value) == told

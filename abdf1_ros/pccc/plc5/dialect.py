@@ -56,7 +56,11 @@ class Plc5Dialect(Dialect):
         typed = TypedData.decode(data)
         element = _element(address, words)
         if (typed.type_id == typed_data.FLOAT) is not (element.type_id == typed_data.FLOAT):
-            raise FormatError(f'the reply holds type {typed.type_id}, not what is at {address}')
+            raise FormatError(
+                f'file {address.file} of this PLC holds floats: write F{address.file}:'
+                f'{address.element}' if typed.type_id == typed_data.FLOAT else
+                f'file {address.file} of this PLC holds no floats (type {typed.type_id}), so '
+                f'{address} is not there; "plc files" lists the files')
         if typed.element_size < element.size and len(typed.data) == words * 2:
             return typed.data  # bytes or characters: the same words in smaller elements
         size = element.size
