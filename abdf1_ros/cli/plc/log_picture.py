@@ -17,6 +17,9 @@ The picture of ``plc plot``: values over time, bits and texts as lanes, gaps wit
 
 Each pixel shows the least and the greatest value of its time, so a week makes a page of the same
 size as an hour. A gap is the time from the last value before it to the first value after it.
+
+Where the time goes back, because a clock was set or files were joined, a new run of rows begins.
+Each value stands at its own time, and a time between two runs is a gap.
 """
 
 from __future__ import annotations
@@ -54,6 +57,7 @@ _IN_DRAWING = 6  # curves
 _STEPS = (1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 10800, 21600, 43200,
           86400, 172800, 604800)  # s; between two times on the axis
 _DAY = 86400
+_BETWEEN = 'between two parts of the file, where its time goes back'
 _KEY = ((Look.ANSWER, 'on'), (Look.ASK, 'text'), (Look.WAIT, 'several in one pixel'),
         (Look.MISSING, 'no value'))
 
@@ -87,6 +91,8 @@ class _Course:
       empty if there were several.
     - ``since``: the time of the last row with a value, or of the first without.
     - ``reason``: why there is no value since ``noted``, empty if there is one.
+    - ``latest``: the value at the latest time, ``latest_at``; ``before``: that of the row before.
+    - ``begun``: the begin of this run of rows; ``runs``: begin and end of the runs before.
     """
 
     bins: dict[int, list[float]] = field(default_factory=dict)
@@ -95,6 +101,8 @@ class _Course:
     count: int = 0
     changes: int = 0
     latest: float | str | None = None
+    latest_at: float = -math.inf
+    before: float | str | None = None
     low: float = math.inf
     high: float = -math.inf
     is_bit: bool = True
@@ -103,12 +111,18 @@ class _Course:
     noted: float = 0.0
     gap_count: int = 0
     missing: float = 0.0
+    begun: float | None = None
+    runs: list[tuple[float, float]] = field(default_factory=list)
 
-    def take(self, number: int, value: float | str) -> None:
+    def take(self, number: int, value: float | str, now: float) -> None:
         """Take a value of a bin."""
         self.count += 1
-        self.changes += self.latest is not None and value != self.latest
-        self.latest = value
+        self.changes += self.before is not None and value != self.before
+        self.before = value
+        if now >= self.latest_at:
+            self.latest, self.latest_at = value, now
+        self.since = now
+        self.begun = now if self.begun is None else self.begun
         if isinstance(value, str):
             self.texts[number] = value if self.texts.get(number, value) == value else ''
             return
@@ -124,16 +138,43 @@ class _Course:
     def begin_gap(self, now: float, reason: str) -> None:
         """Take the reason of a gap, or a further reason."""
         self.since = now if self.since is None else self.since
+        self.begun = self.since if self.begun is None else self.begun
         if not self.reason:
             self.reason, self.noted = reason, now
 
     def end_gap(self, now: float) -> None:
         """End a gap, if there is one."""
         if self.reason and self.since is not None:
-            self.gaps.append(_Gap(self.since, now, self.reason, self.noted))
-            self.gap_count += 1
-            self.missing += now - self.since
+            self._add_gap(_Gap(self.since, now, self.reason, self.noted))
         self.reason = ''
+
+    def _add_gap(self, gap: _Gap) -> None:
+        self.gaps.append(gap)
+        self.gap_count += 1
+        self.missing += gap.end - gap.start
+
+    def goes_back(self, now: float) -> bool:
+        """Return True, and end the run of rows, if ``now`` is before its last row."""
+        if self.since is None or self.begun is None:
+            return False
+        end = max(self.since, self.noted) if self.reason else self.since
+        if now >= end:
+            return False
+        if end > self.since:
+            self.end_gap(end)
+        self.runs = _joined([*self.runs, (self.begun, end)])
+        self.since = self.begun = self.before = None
+        self.reason = ''
+        return True
+
+    def end(self, now: float) -> None:
+        """End the last run at the last row of the file, and find the gaps between the runs."""
+        if not self.goes_back(now):
+            self.end_gap(now)
+        last = [] if self.begun is None or self.since is None else [(self.begun, self.since)]
+        for (_, start), (end, _) in pairwise(_joined([*self.runs, *last])):
+            self._add_gap(_Gap(start, end, _BETWEEN, start))
+        self.gaps.sort(key=lambda gap: gap.start)
 
     def join_bins(self) -> None:
         """Make one bin of two."""
@@ -149,17 +190,22 @@ class _Course:
 
     def join_gaps(self, width: float) -> None:
         """Make one gap of those that begin in the same bin."""
+        self.gaps.sort(key=lambda gap: gap.start)
         kept = self.gaps[:1]
         for gap in self.gaps[1:]:
             if gap.start // width == kept[-1].start // width:
-                kept[-1].end = gap.end
+                kept[-1].end = max(kept[-1].end, gap.end)
             else:
                 kept.append(gap)
         self.gaps = kept
 
 
 class ValuePicture:
-    """Collect the rows of a file in the order of their times, then yield the parts of the page."""
+    """
+    Collect the rows of a file, then yield the parts of the page.
+
+    Rows come in the order of their times; ``remark`` tells where they do not.
+    """
 
     def __init__(self, wanted: Sequence[str] = ()) -> None:
         """Make a picture of the ``wanted`` tags and addresses; of all without any."""
@@ -169,8 +215,10 @@ class ValuePicture:
         self._left_out: dict[ValuePlace, None] = {}
         self._width = _FINEST
         self._begin, self._end = math.inf, -math.inf
+        self._now = -math.inf  # of the last row in the file
         self._zone: tzinfo = UTC
         self.rows = 0
+        self.remark = ''
 
     def add(self, sample: Sample) -> None:
         """Take a row."""
@@ -182,17 +230,27 @@ class ValuePicture:
             self._reach(now)
         if sample.place is None:
             for course in self._courses.values():
-                course.begin_gap(now, sample.reason)
+                if not self._goes_back(course, now):
+                    course.begin_gap(now, sample.reason)
         elif found := self._course(sample.place):
             self._take(found, now, sample)
+        self._now = now
+
+    def _goes_back(self, course: _Course, now: float) -> bool:
+        if not course.goes_back(now):
+            return False
+        self.remark = self.remark or (
+            f'the time goes back from {self._clock(self._now)} to {self._clock(now)}: a clock was '
+            'set, or files were joined in another order; each value stands at its own time')
+        return True
 
     def _take(self, course: _Course, now: float, sample: Sample) -> None:
+        self._goes_back(course, now)
         if sample.value is None:
             course.begin_gap(now, sample.reason)
             return
         course.end_gap(now)
-        course.since = now
-        course.take(int(now // self._width), sample.value)
+        course.take(int(now // self._width), sample.value, now)
         if len(course.gaps) > 2 * _MOST_BINS:
             course.join_gaps(self._width)
 
@@ -230,7 +288,7 @@ class ValuePicture:
     def parts(self) -> Iterator[str]:
         """Yield the parts of the page."""
         for course in self._courses.values():
-            course.end_gap(self._end)
+            course.end(self._now)
             if len(course.gaps) > _MOST_BINS:
                 course.join_gaps(self._width)
         groups = [*self._groups()]
@@ -242,6 +300,8 @@ class ValuePicture:
         yield f'<p class="verdict {"is-odd" if groups else "is-good"}">{verdict}</p>'
         yield (f'<p>{self._clock(self._begin)} to {self._clock(self._end)} '
                f'({self._zone_name()}), {counted(self.rows, "row")}</p>')
+        if self.remark:
+            yield f'<p class="is-odd">{text_of(self.remark)}</p>'
         if self._left_out and not self._wanted:
             yield (f'<p class="is-odd">and {counted(len(self._left_out), "value")} more: name '
                    'those to draw after the file</p>')
@@ -378,6 +438,17 @@ class ValuePicture:
 
     def _zone_name(self) -> str:
         return str(self._zone)
+
+
+def _joined(spans: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Return begins and ends in their order, one for those that overlap."""
+    kept: list[tuple[float, float]] = []
+    for begin, end in sorted(spans):
+        if kept and begin <= kept[-1][1]:
+            kept[-1] = kept[-1][0], max(kept[-1][1], end)
+        else:
+            kept.append((begin, end))
+    return kept
 
 
 def _is_curve(course: _Course) -> bool:

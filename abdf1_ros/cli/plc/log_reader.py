@@ -38,6 +38,7 @@ from abdf1_ros.text import shown
 _RECORDED = ('time', 'topic', 'address', 'values')
 _WATCHED = re.compile(r'\d\d:\d\d:\d\d\.\d{3}  \S')
 _STRING_FILE = 'ST'
+_JOINED = 'another file was joined here'
 _NOT_FINITE = {'nan', 'inf', '-inf'}
 
 
@@ -112,13 +113,20 @@ def _whole_lines(file: TextIO, tell_cut: Callable[[], None]) -> Iterator[str]:
 def _rows(path: str, lines: Iterable[str],
           read: Callable[[Sequence[str]], Iterable[Sample]], delimiter: str) -> Iterator[Sample]:
     reader = csv.reader(lines, delimiter=delimiter)
+    is_joined = False
     while True:
         try:
             row = next(reader, None)
             if row is None:
                 return
-            if row and row[0] != 'time':  # the head again, where files were joined
-                yield from read(row)
+            if row and row[0] == 'time':  # the head again, where files were joined
+                is_joined = True
+            elif row:
+                for sample in read(row):
+                    if is_joined:
+                        yield Sample(sample.when, None, None, _JOINED)
+                    is_joined = False
+                    yield sample
         except (ValueError, csv.Error) as error:
             raise Problem(f'{path}:{reader.line_num + 1}', _fault(error)) from None
 

@@ -221,7 +221,49 @@ def test_clock_that_is_set_back_and_values_that_are_no_numbers_are_drawn(
             row(-40, 'F8:0', math.inf), row(10, 'F8:0', 0.5)]
     said, page = plotted(tmp_path, capsys, logged(tmp_path / 'shift', rows))
     assert said.status == 0 and 'F8:0: 0.5 to 2.5' in elements(page).texts
+    assert said.err == (
+        f'plc: {tmp_path / "shift"}: the time goes back from 2026-03-01 14:06:40 to 2026-03-01 '
+        '14:04:10: a clock was set, or files were joined in another order; each value stands at '
+        'its own time\n')
+    assert not [text for text in elements(page).texts if '-' in text and text.endswith(' s')]
     assert '2026-03-01 14:04:10 to 2026-03-01 14:06:40' in ' '.join(elements(page).texts)
+
+
+EARLY = [row(n, 'N7:0', n) for n in range(60)]
+LATE = [row(28800 + n, 'N7:0', 1000 + n) for n in range(60)]
+
+
+@pytest.mark.parametrize(('parts', 'reason'), [
+    ((EARLY, LATE), 'another file was joined here'),
+    ((LATE, EARLY), 'between two parts of the file, where its time goes back')])
+def test_files_that_were_joined_have_a_gap_between_them_in_any_order(
+        tmp_path: Path, capsys: Output, parts: tuple[list[LogRow], ...], reason: str) -> None:
+    joined = ''.join(logged(tmp_path / 'part', part).read_text() for part in parts)
+    (tmp_path / 'shift.csv').write_text(joined)
+    said, page = plotted(tmp_path, capsys, tmp_path / 'shift.csv')
+    found = elements(page)
+    assert (said.status, said.err != '') == (0, parts[0] is LATE)
+    assert [path.count('M') for path in paths(found)] == [2]
+    told = [text for text in found.texts if text.strip()]
+    assert '1 gap, the longest 7:59:01' in told and told.count(reason) == 1
+    at = told.index('In figures')
+    assert told[told.index('N7:0', at):][1:8] == [
+        '120', '0', '1059', '1059', '118' if parts[0] is LATE else '119', '1', '7:59:01']
+
+
+def test_clock_that_is_set_back_in_a_gap_makes_no_gap_of_less_than_nothing(
+        tmp_path: Path, capsys: Output) -> None:
+    rows = [*(row(n, 'N7:0', n) for n in range(30)), row(31, 'N7:0', reason=SILENT),
+            *(row(n, 'N7:0', n) for n in range(12, 25))]
+    said, page = plotted(tmp_path, capsys, logged(tmp_path / 'shift', rows))
+    texts = elements(page).texts
+    assert said.err.count('the time goes back') == 1 == ' '.join(texts).count('the time goes back')
+    assert '1 gap, the longest 2.0 s' in texts
+    # A row about all values, and files that overlap, make none either.
+    rows = [row(60, '', reason='the log goes on', station=None), row(61, 'N7:0', 70)]
+    whole = [row(n, 'N7:0', n) for n in range(100)]
+    _, page = plotted(tmp_path, capsys, logged(tmp_path / 'shift', [*whole, *rows]))
+    assert 'no gap' in elements(page).texts
 
 
 @pytest.mark.parametrize('form', ['csv', 'jsonl'])

@@ -64,6 +64,8 @@ def run(options: argparse.Namespace) -> int:
             f'{first(picture.names) or "no values"}'))])
     if not picture.rows:
         raise ConfigurationError([Problem(options.file, 'has no row below its head')])
+    if picture.remark:
+        complain(f'{options.file}: {picture.remark}')
     try:
         write_page(options.html, Path(options.file).name, picture.parts())
     except OSError as error:
