@@ -134,7 +134,7 @@ def _pair(options: argparse.Namespace) -> tuple[str, bool]:
         content = _content(found, report)
         return json.dumps(content | ({'heard': heard} if heard else {}), indent=2), \
             is_drawn and not found.problems
-    return _text(found, report) + ('' if heard is None else _heard_text(heard)), \
+    return _text(found, report, heard) + ('' if heard is None else _heard_text(heard)), \
         is_drawn and not found.problems
 
 
@@ -183,9 +183,12 @@ def _heard(found: Findings, files: Sequence[str]) -> _Heard | None:
 def _heard_text(heard: _Heard) -> str:
     rows = heard['rows']
     texts = [f'warning: {printable(tag)} is not filled: {why}' for tag, why in rows.items() if why]
+    if len(reasons := {*rows.values()}) == 1 and all(reasons):
+        texts = [f'warning: no row is filled: {reasons.pop()}']
     filled = sum(not why for why in rows.values())
+    has = '; it has:' if heard['reads'] else ', and has no read that was answered'
     return '\n'.join(['', '', *(colour(text, YELLOW, sys.stdout) for text in texts),
-                      f'the recording fills {filled} of {counted(len(rows), "row")}; it has:',
+                      f'the recording fills {filled} of {counted(len(rows), "row")}{has}',
                       *(f'  {printable(text)}' for text in heard['reads'])])
 
 
@@ -305,8 +308,8 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
     return options
 
 
-def _text(found: Findings, report: Report | None) -> str:
-    """Return the output as text."""
+def _text(found: Findings, report: Report | None, heard: _Heard | None) -> str:
+    """Return the output as text, without the recordings; only they may have warnings."""
     parts = [colour(f'error: {problem}', RED, sys.stdout) for problem in found.problems]
     if report is None:
         return '\n'.join([*parts, 'no plan without a good net file'])
@@ -322,7 +325,7 @@ def _text(found: Findings, report: Report | None) -> str:
         if not report.network.line_mode.only_listens:
             parts += ['', _folded(_plan_text(report)), '', _times_text(report)]
     parts += [f'note: {printable(note)}' for note in report.notes()]
-    if not found.problems and not remarks:
+    if not found.problems and not remarks and not (heard and any(heard['rows'].values())):
         parts.append(colour('no errors, no warnings', GREEN, sys.stdout))
     return '\n'.join(parts).lstrip('\n')
 

@@ -37,6 +37,7 @@ from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.rows import Rows
 from abdf1_ros.sniffer.capture import Chunk, Direction
 from abdf1_ros.sniffer.dumps import Recording
+from abdf1_ros.sniffer.traffic import TrafficDecoder
 from abdf1_ros.text import counted
 
 _SECOND = '<'  # bytes from the far side of a recording count as bytes of a second port
@@ -68,13 +69,16 @@ class Overhearing:
     """
     A driver that only listens to a recording or a port, with the reads that it heard.
 
-    ``carried``: the answered reads.
+    ``carried``: the answered reads; ``size``: bytes; ``has_messages``: commands or replies.
     """
 
     def __init__(self, network: Network, mappings: Rows = Rows()) -> None:  # noqa: B008
         self._driver = Driver(network, mappings, DriverSettings(), cast(Listener, _Ignoring()))
         self._driver.machine.start(-1.0)
         self._now = 0.0
+        self._traffic = TrafficDecoder(network.checksum)
+        self.size = 0
+        self.has_messages = False
 
     def hear(self, chunk: Chunk) -> None:
         """Read a chunk of bytes; the caller gives chunks in the order of their times."""
@@ -82,6 +86,10 @@ class Overhearing:
         is_far = chunk.direction is Direction.IN
         self._driver.machine.receive_data(
             SecondPort(chunk.data) if is_far else chunk.data, self._now)
+        self.size += len(chunk.data)
+        self.has_messages = self.has_messages or any(
+            entry.packet is not None and entry.valid is not False
+            for entry in self._traffic.feed(chunk))
 
     @property
     def carried(self) -> list[Carried]:
@@ -105,6 +113,11 @@ def overheard(network: Network, rows: Rows,
     Raises OSError, and Problem if a file is damaged.
     """
     heard = [_recording(network, rows, Path(file)) for file in files]
+    if not any(each.has_messages for each in heard):
+        size = sum(each.size for each in heard)
+        return [], dict.fromkeys(rows, (
+            f'no message in {counted(size, "byte")}: another Error_Code, baud rate or protocol'
+            if size else 'nothing was recorded'))
     unread = [each.unread() for each in heard]
     return texts_of(read for each in heard for read in each.carried), {
         row: max((reasons[row] for reasons in unread), key=len)  # the longer one names a read

@@ -122,10 +122,11 @@ def test_every_error_of_both_files_at_once(check: Check, files: Paths) -> None:
         f'error: {rows}:2:3 (Address): 2503 ERR_ADDRESS_SYNTAX: Item: 1, ',
         f'error: {rows}:3:2 (Command): Item: 2, Command = "Rad" should be one of Read, ',
         f'error: {rows}:3:4 (Station): 2501 ERR_BAD_STATION: Item: 2, ',
+        f'error: {rows}:5:1 (Tag): Item: 4, tag "a" is already the tag of item 1 (line 2',
         f'error: {rows}:5:3 (Address): 2504 ERR_ADDRESS_RANGE: Item: 4, ']
-    for beginning, line in zip(beginnings, lines[:7], strict=True):
+    for beginning, line in zip(beginnings, lines[:8], strict=True):
         assert line.startswith(beginning)
-    assert lines[7:] == ['no plan without a good net file']
+    assert lines[8:] == ['no plan without a good net file']
 
 
 def test_plan_of_the_good_rows(check: Check, files: Paths) -> None:
@@ -306,6 +307,32 @@ def test_folder_of_this_place_has_its_own_name(
     monkeypatch.chdir(tmp_path)
     main(['.'])
     assert capsys.readouterr().out.startswith(f'{tmp_path.name}: 1 row, port /dev/ttyUSB0')
+
+
+@pytest.mark.parametrize(('recorded', 'why'), [
+    ('', 'nothing was recorded'), ('# abdf1_ros capture 1\n', 'nothing was recorded'),
+    # Modbus ASCII; then a message of DF1 whose check is a BCC
+    ('# abdf1_ros capture 1\n0.1 > 3A 30 31 30 33 30 30 46 43 0D 0A\n',
+     'no message in 11 bytes: another Error_Code, baud rate or protocol'),
+    ('# abdf1_ros capture 1\n0.1 > 10 02 01 05 0F 00 2A 00 A2 02 07 89 00 00 10 03 8D\n',
+     'no message in 17 bytes: another Error_Code, baud rate or protocol'),
+    # a write
+    ('# abdf1_ros capture 1\n0.1 > 10 02 01 05 0F 00 2A 00 AA 02 07 89 00 00 63 00 10 03 84 EA\n',
+     'no other node reads it')])
+def test_recording_without_any_read_is_told_with_its_cause(
+        tmp_path: Path, capsys: Output, recorded: str, why: str) -> None:
+    net, rows, cap = (tmp_path / name for name in ('net.csv', 'map.csv', 'line.cap'))
+    net.write_text('Mode,Com_Port\nListen,/dev/ttyS0\n', encoding='utf-8')
+    rows.write_text('Tag,Command,Address,Station,PLC_Type,Period\na,Read,N7:0,1,SLC,500\n'
+                    'b,Read,N7:1,1,SLC,500\n', encoding='utf-8')
+    cap.write_text(recorded, encoding='utf-8')
+    assert main([str(net), str(rows), '--heard', str(cap)]) == 0
+    said = capsys.readouterr().out
+    assert said.endswith(f'\nwarning: no row is filled: {why}\nthe recording fills 0 of 2 rows, '
+                         'and has no read that was answered\n')
+    assert 'no warnings' not in said
+    assert main([str(net), str(rows)]) == 0
+    assert 'no errors, no warnings' in capsys.readouterr().out
 
 
 def test_rows_that_a_recording_fills_are_told(tmp_path: Path, capsys: Output) -> None:
