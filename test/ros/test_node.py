@@ -27,6 +27,7 @@ import time
 from typing import Any
 from unittest.mock import Mock
 
+from builtin_interfaces.msg import Time
 from abdf1_ros.driver.kernel import waiting
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
@@ -35,6 +36,7 @@ from abdf1_ros.ros.bridge.node import end_together
 from abdf1_ros.ros.diagnostics import graph
 from diagnostic_msgs.msg import DiagnosticStatus
 import pytest
+from rosgraph_msgs.msg import Clock
 from rcl_interfaces.msg import Parameter, ParameterValue
 from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.duration import Duration
@@ -549,6 +551,17 @@ def test_simulated_time_that_has_not_begun_is_not_put_into_stamps(make_bench: Be
     bench = make_bench(SPEED, parameters=('use_sim_time:=true',))
     stamp = bench.diagnostics.next().header.stamp
     assert abs(stamp.sec - time.time()) < 60
+
+
+def test_simulated_time_is_put_into_stamps_once_it_has_begun(make_bench: Benches) -> None:
+    bench = make_bench(SPEED, parameters=('use_sim_time:=true',))
+    clock = bench.ros.node.create_publisher(Clock, '/clock', 10)
+
+    def is_simulated() -> bool:
+        clock.publish(Clock(clock=Time(sec=100)))
+        return bool(bench.diagnostics) and bench.diagnostics[-1].header.stamp.sec == 100
+
+    bench.ros.until(is_simulated, 'a stamp of simulated time')
 
 
 def test_odd_settings_are_told_in_the_log_but_not_without_end(
