@@ -27,22 +27,22 @@ import time
 from typing import Any
 from unittest.mock import Mock
 
-from builtin_interfaces.msg import Time
 from abdf1_ros.driver.kernel import waiting
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.ports.port_thread import PortState
 from abdf1_ros.ros.bridge.node import end_together
 from abdf1_ros.ros.diagnostics import graph
+from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus
 import pytest
-from rosgraph_msgs.msg import Clock
 from rcl_interfaces.msg import Parameter, ParameterValue
 from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.duration import Duration
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.publisher import Publisher
+from rosgraph_msgs.msg import Clock
 from std_msgs import msg
 from std_srvs.srv import SetBool, Trigger
 from support import ros
