@@ -102,6 +102,14 @@ class Ear(Listener):
         self.seen.last_events[event.station] = event, self._clock()
         self._event_log.add(event)
 
+    def published_again(self, mapping: Mapping, seconds: float) -> None:
+        """Log that a row is published again."""
+        self._lines.info(mapping.tag, 'published again')
+
+    def foreign_value(self, mapping: Mapping, text: str, is_conflict: bool) -> None:
+        """Log that a heartbeat has a value that is not ours."""
+        self._lines.warning(mapping.tag, text)
+
     def station_changed(self, station: Station) -> None:
         """Log that a station has come or gone."""
         self._event_log.forget(station.number)

@@ -106,7 +106,7 @@ def _planned() -> tuple[int, float]:
         rows.write_text(MAP, encoding='utf-8')
         found = examine(str(net), str(rows))
     assert found.network is not None
-    beat, *fallbacks = make_report(found.network, found.mappings, 0.1).bounds
+    beat, *fallbacks = make_report(found.network, found.mappings, 0.1).times.bounds()
     assert beat.presets is not None
     return beat.presets[0], max(fallback.seconds or 0.0 for fallback in fallbacks)
 

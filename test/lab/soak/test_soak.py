@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections import deque
+from typing import Any
 
 import pytest
 from soak.faulty_line import FaultyLine, FLOOD, MODES
@@ -53,7 +54,8 @@ def test_long_containers_are_found() -> None:
     class Keeper:
 
         def __init__(self) -> None:
-            self.inner = {'a': deque(range(7)), 'b': [{1: set(range(9))}]}
+            self.inner: dict[str, Any] = {
+                'a': deque(range(7)), 'b': [{1: set(range(9))}]}
 
     keeper = Keeper()
     lengths = container_lengths(keeper)
