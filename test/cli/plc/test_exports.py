@@ -292,6 +292,8 @@ def test_command_writes_a_map_once_and_says_how_to_go_on(
     ('N7:0,SPEED OF LINE,x\n', 'has addresses, but no first row with names: write one, such as '),
     ('N7:0,Global,SPEED\nN7:1,2,LEVEL\n', 'has addresses, but no first row with names'),
     ('N7:0,RUN\nN7:1,RUN\n', 'has addresses, but no first row with names'),
+    *(('"N7:0"X"Débit, eau"X""X"l; mm"\n"N7:1"X"Niveau"X""X""\n'.replace('X', sign),
+       'has addresses, but no first row with names') for sign in ',;\t'),
     ('Tag,Command,Address,Station,PLC_Type\na,Read,N7:0,1,SLC\n', 'is a map already'),
     ('Tag,Command,Address,Station,PLC_Type,Via\na,Read,N7:0,1,SLC,\n', 'is a map already'),
     (f'Tag,Address\n{"x" * 200_000},N7:0\n', 'export.csv:2: field larger than field limit'),

@@ -164,7 +164,7 @@ def _code_page(raw: bytes) -> str:
 
 def _delimiter(text: str) -> str:
     """Return the delimiter that most lines have; a comment may begin with a semicolon."""
-    lines = [re.sub('"[^"]*"', '', line).lstrip().lstrip(';')
+    lines = [re.sub('"[^"]*"', '""', line).lstrip().lstrip(';')
              for line in text[:100_000].splitlines()[:_LOOKED_AT]]
     return max(_DELIMITERS, key=lambda sign: (
         sum(sign in line for line in lines), sum(line.count(sign) for line in lines)))
