@@ -83,12 +83,13 @@ class LogForm:
 
     - ``head``: the first line of a file, empty for none.
     - ``line``: the line of a row.
-    - ``first_line``: what the first line of such a file looks like.
+    - ``first_line``: what the first line of such a file looks like; ``any_row``: each row.
     """
 
     head: str
     line: Callable[[LogRow], str]
     first_line: re.Pattern[str]
+    any_row: re.Pattern[str]
 
 
 def is_end_of_gap(reason: str) -> bool:
@@ -159,10 +160,14 @@ def _tag_text(text: str) -> str:
 
 _HEAD = ','.join(COLUMNS)
 
+_JSON_ROW = re.compile(r'\{"time": ".*"reason": ".*"\}')
+_POINT = re.compile(rf'{_MEASUREMENT}[, ].* \d+')
+
 FORMS = {
-    'csv': LogForm(_HEAD, _csv_line, re.compile(re.escape(_HEAD))),
-    'jsonl': LogForm('', _json_line, re.compile(r'\{"time": ".*"reason": ".*"\}')),
-    'influx': LogForm('', _line_protocol, re.compile(rf'{_MEASUREMENT}[, ].* \d+')),
+    'csv': LogForm(_HEAD, _csv_line, re.compile(re.escape(_HEAD)), re.compile(
+        r'\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}[+-]\d\d:\d\d(?:,.*){5}')),
+    'jsonl': LogForm('', _json_line, _JSON_ROW, _JSON_ROW),
+    'influx': LogForm('', _line_protocol, _POINT, _POINT),
 }
 
 
@@ -305,11 +310,15 @@ class LogFile(Log):
         self._is_continued = self._size > 0
 
     def _end_of_rows(self) -> int:
-        """Return the size without the rest of a row."""
+        """Return the size without the rest of a row, if the last row is one of this form."""
         start = max(0, self._size - _LONGEST_ROW)
-        rest = os.pread(self._file, _LONGEST_ROW, start).rpartition(b'\n')[2]
+        whole, _, rest = os.pread(self._file, _LONGEST_ROW, start).rpartition(b'\n')
         if len(rest) > self._size - start - 1:
             raise self._fault('has no line end in its last 64 kB')
+        last = whole.rstrip().rpartition(b'\n')[2].decode('utf-8', 'replace').rstrip('\r')
+        if not (self._form.any_row.fullmatch(last) or self._form.first_line.fullmatch(last)):
+            raise self._fault('was changed, perhaps saved again by a spreadsheet: its last row is '
+                              f'"{shown(last)}"')
         if rest:
             self.remark = (f'{self.path}: removed the rest of a row that was not written to its '
                            f'end: "{shown(rest.decode("utf-8", "replace"))}"')

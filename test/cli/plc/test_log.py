@@ -162,6 +162,30 @@ def test_other_file_is_refused_and_stays(tmp_path: Path, form: str, content: str
     assert str(path) in str(caught.value) and path.read_text() == content
 
 
+@pytest.mark.parametrize('content', [
+    f'{HEAD}\r\n29.11.2026 01:43,1,N7:0,,213,\r\n', f'{HEAD}\n11/29/2026 1:43,1,N7:0,,213,\n\n',
+    f'{HEAD}\n43:59.5,1,N7:0,,213,\n', f'{HEAD}\n2026-03-01T14:05:09.250+01:00,1,N7:0\n',
+    f'{HEAD}\n29.11.2026 01:43,1,N7:0,,213,\n2026-0'])
+def test_log_that_a_spreadsheet_saved_again_is_refused_and_stays(
+        tmp_path: Path, content: str) -> None:
+    path = tmp_path / 'shift.csv'
+    path.write_bytes(content.encode())
+    with pytest.raises(ConfigurationError) as caught:
+        log_of(path, 'csv')
+    last = content.splitlines()[1]
+    assert str(caught.value) == (
+        f'--to: {path} was changed, perhaps saved again by a spreadsheet: its last row is '
+        f'"{last}"; give another name')
+    assert path.read_bytes() == content.encode()
+
+
+def test_log_whose_line_ends_a_program_has_changed_goes_on(tmp_path: Path) -> None:
+    path = tmp_path / 'shift.csv'
+    begun = written(path)
+    path.write_bytes(path.read_bytes().replace(b'\n', b'\r\n'))
+    assert len(written(path)) == 2 * len(begun)
+
+
 def test_second_writer_is_refused(tmp_path: Path) -> None:
     path = tmp_path / 'shift'
     first = log_of(path)
