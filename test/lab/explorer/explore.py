@@ -28,6 +28,7 @@ from collections.abc import Callable, Hashable, Iterator, Sequence, Set
 from collections.abc import Mapping as MappingType
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from enum import Enum
+from functools import partial
 import math
 from pathlib import Path
 from random import Random
@@ -123,8 +124,8 @@ class Digest:
             return tuple((self._of(key), self._of(value)) for key, value in it.items())
         if isinstance(it, Set):
             return tuple(sorted(map(str, map(self._of, it))))
-        if isinstance(it, Sequence) or hasattr(it, 'popleft'):
-            return tuple(map(self._of, it))  # type: ignore[arg-type]
+        if isinstance(it, Sequence):  # also a deque
+            return tuple(map(self._of, it))
         if callable(it) or isinstance(it, Random):
             return None
         return type(it).__name__, *self._parts(it)
@@ -199,7 +200,7 @@ def find(mistake: Mistake) -> tuple[str, Told] | None:
     with mock.patch.object(mistake.owner, mistake.name, made):
         for name, plant in PLANTS.items():
             exploration = Exploration(plant)
-            exploration.run(is_enough=lambda broken=exploration.broken: bool(broken))
+            exploration.run(is_enough=partial(bool, exploration.broken))
             if exploration.broken:
                 return name, next(iter(exploration.broken.values()))
     return None
@@ -224,6 +225,10 @@ def _find_all() -> int:
     return 0
 
 
+def _is_over(end: float) -> bool:
+    return time.process_time() >= end
+
+
 def main() -> int:
     """Explore; return the exit status."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
@@ -246,7 +251,7 @@ def main() -> int:
     for name in names:
         begun = time.process_time()
         exploration = Exploration(replace(PLANTS[name], **changes))
-        exploration.run(is_enough=lambda end=begun + asked.seconds: time.process_time() >= end)
+        exploration.run(is_enough=partial(_is_over, begun + asked.seconds))
         seconds = time.process_time() - begun
         print(f'{name}: {exploration.states} states, {exploration.stories} stories, '
               f'{seconds:.1f} s, {len(exploration.broken)} kinds broken', flush=True)

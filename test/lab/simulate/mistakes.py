@@ -318,7 +318,8 @@ def _proves_itself(ended: Any) -> Any:
 def _proves_for_long(proof: Any) -> Any:
     def prove_wrongly(self: Words, write: Write, now: float, patience: float) -> str:
         last = self.last
-        return proof(self, write, min(now, last.shown, last.done) if last else now, patience)
+        return str(proof(
+            self, write, min(now, last.shown, last.done) if last else now, patience))
 
     return prove_wrongly
 

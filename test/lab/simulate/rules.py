@@ -503,7 +503,7 @@ class Beats(Rule):
         if world.rows[entry.tag].condition:
             topic = f'w0_{entry.station}'
             came = world.youngest.get(topic, -math.inf)
-            self.demand(entry.when - came < plant.requires / 1000 + _MOMENT, entry,
+            self.demand(entry.when - came < (plant.requires or 0) / 1000 + _MOMENT, entry,
                         'without a message since', came)
             gap = world.gaps.get(topic, math.inf)
             self.demand(not before or not before.value
@@ -519,7 +519,7 @@ class Beats(Rule):
                 self._over.add(tag)
             return
         last = self._last.get(tag)
-        self.demand(not value or last or tag not in self._over, entry,
+        self.demand(not value or bool(last) or tag not in self._over, entry,
                     'after a guest wrote over the 0')
         self._over.discard(tag)
         is_ours = tag.startswith('beat')

@@ -507,8 +507,8 @@ def main() -> int:
     print(f'seed {wanted.seed}', flush=True)
 
     def is_enough(totals: Totals) -> bool:
-        return totals.seconds >= 3600 * wanted.hours or totals.plants >= wanted.plants \
-            or time.process_time() - begun >= wanted.seconds
+        return bool(totals.seconds >= 3600 * wanted.hours or totals.plants >= wanted.plants
+                    or time.process_time() - begun >= wanted.seconds)
 
     try:
         totals = simulate(wanted.seed, is_enough, wanted.mode, wanted.turns)

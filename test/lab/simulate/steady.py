@@ -29,6 +29,7 @@ from functools import partial
 from itertools import groupby, takewhile
 from operator import itemgetter
 from random import Random
+from typing import Any
 
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.settings import LinkSettings
@@ -77,6 +78,10 @@ class Said:
     results: list[WriteResult] = field(default_factory=list)
 
 
+def _cells(name: str) -> dict[str, Any]:
+    return {'command': 'Write', 'plc': 'PLC5'} | KINDS[name][1]
+
+
 def within(entries: list[tuple[float, bytes]], since: float, until: float,
            ) -> list[tuple[float, bytes]]:
     """Return what was from one time to another, of entries in their order."""
@@ -92,8 +97,7 @@ class Steady(DriverBench):
         mode = dice.choice(MODES)
         self._names = dice.sample([*KINDS], dice.randrange(2, 7))
         self.rows: dict[str, Mapping] = {
-            name: make_mapping(KINDS[name][0], tag=name, **(  # type: ignore[arg-type]
-                {'command': 'Write', 'plc': 'PLC5'} | KINDS[name][1])) for name in self._names}
+            name: make_mapping(KINDS[name][0], tag=name, **_cells(name)) for name in self._names}
         self._is_light = dice.random() < 0.5
         if dice.random() < 0.5:  # an unchanged value is written again only now and then
             again, period = dice.choice([300, 1000, 60_000]), dice.choice([50, 200])

@@ -30,6 +30,7 @@ import ast
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import partial
 import json
 from pathlib import Path
 from random import Random
@@ -183,7 +184,7 @@ def judge(names: Iterable[str], deviations: int, ledgers: Path) -> tuple[str, in
             others += before.has(one) and before.differs(one)
 
         try:
-            for _ in walk.to(deviations, lambda walk=walk: bool(walk.broken), take):
+            for _ in walk.to(deviations, partial(bool, walk.broken), take):
                 pass
         except Exception as error:
             return f'{name}: {type(error).__name__} {error}', others

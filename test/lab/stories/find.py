@@ -22,6 +22,7 @@ there is none. Mistakes in what the stories leave out (values, other modes) are 
 from __future__ import annotations
 
 import argparse
+from functools import partial
 from pathlib import Path
 import sys
 import time
@@ -41,7 +42,7 @@ def find(mistake: Mistake, deviations: int) -> tuple[str, Told] | None:
     with mock.patch.object(mistake.owner, mistake.name, made):
         for name in SMALL:
             walk = Walk(SCENES[name])
-            for _ in walk.to(deviations, lambda walk=walk: bool(walk.broken)):
+            for _ in walk.to(deviations, partial(bool, walk.broken)):
                 pass
             if walk.broken:
                 one = walk.broken[0]
