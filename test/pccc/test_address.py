@@ -263,10 +263,9 @@ def test_number_after_a_timer_is_no_bit_unless_it_has_a_name(
                       'in I:017/12'),
     ('O:2.0', PLC5, 'this is the form of an SLC; a PLC-5 has rack, group and bit in octal, as in '
                     'I:017/12'),
-    ('I:017/12', SLC, 'this is the octal form of a PLC-5; an SLC has slot, word and bit, as in '
-                      'I:1.0/3'),
-    ('o:001', SLC, 'this is the octal form of a PLC-5; an SLC has slot, word and bit, as in '
-                   'O:1.0/3'),
+    *((text, SLC, 'this is the octal form of a PLC-5 (PLC_Type PLC5); an SLC has slot, word and '
+       f'bit, as in {text[0].upper()}:1.0/3') for text in (
+           'I:017/12', 'o:001', 'I:008/00', 'I:010/18', 'O:099')),
     *((f'{file}:0.5', SLC, f'a bit stands after "/"; write {file}:0/5') for file in (
         'B3', 'S2', 'A9', 'D9')),
     ('n7:12.03', PLC5, 'a bit stands after "/"; write N7:12/3'),

@@ -56,7 +56,8 @@ FILES = {
 
 BY_CODE = {layout.code: kind for kind, layout in FILES.items()}
 
-_PLC5_IO = re.compile(r'[#$]?(?P<type>[IO])\d?[:;]0[0-7]{2}(?:/[0-7]{1,2})?', re.ASCII)
+# An 8 or 9 in such a number is a fault there, too, but three digits with a 0 are no slot.
+_PLC5_IO = re.compile(r'[#$]?(?P<type>[IO])\d?[:;]0\d{2}(?:/\d{1,2})?', re.ASCII)
 # Function files of the MicroLogix whose type code is not known.
 _UNKNOWN_FILES = re.compile(
     r'(?P<name>BHI|CS|DAT|DLS|ES|IOS|LCD|MMI|RTC|TPI)\d*(?:[:;/.].*)?', re.ASCII)
@@ -83,8 +84,8 @@ class _SlcAddressing(FileAddressing):
             return (f'{match["name"]} is a function file whose type code is not known{clock}; let '
                     'the program copy what is needed into an N file')
         if match := _PLC5_IO.fullmatch(text):
-            return ('this is the octal form of a PLC-5; an SLC has slot, word and bit, as in '
-                    f'{match["type"]}:1.0/3')
+            return ('this is the octal form of a PLC-5 (PLC_Type PLC5); an SLC has slot, word and '
+                    f'bit, as in {match["type"]}:1.0/3')
         return None
 
     def last_element(self, kind: FileType, is_flat: bool = False) -> int:

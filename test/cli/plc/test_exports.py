@@ -199,6 +199,19 @@ def test_octal_addresses_are_for_a_plc5(tmp_path: Path) -> None:
     assert 'octal form of a PLC-5' in imported(tmp_path, row)[1][0]
 
 
+@for_all(('rows', 'hint'), [
+    ('a,I:001/00\nb,O:017/07\nc,N7:2\n', True), ('a,I:001/00\nb,I:1.0/3\nc,N7:2\n', False),
+    ('a,I:008/00\nc,N7:2\n', False), ('a,N7:2\nb,N7:x\n', False)])
+def test_family_that_can_use_the_rows_left_out_is_named(
+        tmp_path: Path, capsys: Output, rows: str, hint: bool) -> None:
+    source, into = tmp_path / 'plant.csv', tmp_path / str(len([*tmp_path.iterdir()]))
+    source.write_text(f'Tag,Address\n{rows}', encoding='utf-8')
+    assert main(['import', str(source), '--into', str(into)]) == 1
+    said = capsys.readouterr().err
+    assert (f'{source}: --plc-type PLC3 or PLC5 can use 3 rows\n' in said) is hint
+    assert hint or 'can use' not in said
+
+
 def test_text_of_windows_with_line_ends_in_cells_and_semicolons(tmp_path: Path) -> None:
     (mapping,), _ = imported(tmp_path, (
         KEPSERVER.replace(',', ';').replace('Eng ', 'Engineering ')

@@ -97,14 +97,16 @@ def _stations_by_name(text: str) -> dict[str, int]:
     return found
 
 
-def _other_family(path: str, wanted: Wanted) -> str:
-    """Return the family that can use all rows of a file, empty for none or an unclear file."""
+def _other_families(path: str, wanted: Wanted) -> str:
+    """Return the families that can use all rows of a file, empty for none or an unclear file."""
+    counts: dict[str, int] = {}
     for kind in FAMILIES:
         with suppress(ConfigurationError):
             found = import_map(path, replace(wanted, plc_type=kind))
             if found.count and not found.left_out and not found.notes:
-                return f'; --plc-type {kind.value} can use {counted(found.count, "row")}'
-    return ''
+                counts[kind.value] = found.count
+    return f'--plc-type {" or ".join(counts)} can use {counted(max(counts.values()), "row")}' \
+        if counts else ''
 
 
 def run(options: argparse.Namespace) -> int:
@@ -127,10 +129,13 @@ def run(options: argparse.Namespace) -> int:
     for text, count in (+result.remarks).items():
         complain(f'{counted(count, "row")}: {text}')
     left_out = f', {len(result.left_out)} left out' if result.left_out else ''
+    others = _other_families(options.file, wanted) if result.left_out or not result.count else ''
     if not result.count:
         complain(f'{options.file}: no row can be used{left_out}; nothing was written'
-                 f'{_other_family(options.file, wanted)}')
+                 f'{others and f"; {others}"}')
         return EXIT_FAILED
+    if others:
+        complain(f'{options.file}: {others}')
     file = init.NewFiles(Path(options.into), 'map.csv')
     file.write(result.text)
     target, = file.paths
