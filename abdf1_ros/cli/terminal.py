@@ -35,7 +35,6 @@ from typing import Any, NoReturn, TextIO
 from abdf1_ros.errors import PortLost
 from abdf1_ros.numbers import decimal_number, whole_number
 from abdf1_ros.paths import as_called, expanded, ShowVersion
-from abdf1_ros.ports.ownership import BUSY
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.hints import pasted
 from abdf1_ros.signals import drop, has_no_reader, limit_output
@@ -208,6 +207,7 @@ _SETTINGS_AFTER = re.compile(r'/dev/[^:,@]+[:,@](\d{3,6})(?:[,:]\w+)*')  # as so
 
 def reason_of(name: str, error: OSError) -> str:
     """Return why ``name`` cannot be used, with advice; the text has the name once."""
+    from abdf1_ros.ports.ownership import BUSY  # a help needs no port
     text = error.strerror or str(error)
     settings = _SETTINGS_AFTER.fullmatch(name)
     advice = f'a speed is given as --baud {settings[1]}' if settings else \

@@ -93,7 +93,7 @@ RULES = (
          '"plc detect" lists the stations that the master polls; give one of them with '
          '--own-station', Traces(SLAVE)),
     Rule('a message with the check of Modbus RTU',
-         lambda t: t.is_modbus,
+         lambda t: t.is_modbus and not t.replies,  # noise may have its check
          'a device that speaks Modbus RTU is at the far end',
          'set the channel of the PLC to DF1, or find the right cable',
          Traces(characters=8, first=bytes.fromhex('01 03 00 00 00 0A C5 CD'))),

@@ -15,6 +15,7 @@
 """The table of causes, and what the bytes of a line show."""
 
 from collections.abc import Iterable
+from dataclasses import replace
 from string import Formatter
 
 from abdf1_ros.df1.checksum import Checksum
@@ -171,6 +172,12 @@ def test_own_bytes_that_come_back_are_left_out() -> None:
     (bytes(range(64)), False, False), (bytes(64), False, False)])
 def test_text_and_modbus_are_known(data: bytes, is_text: bool, is_modbus: bool) -> None:
     assert names(Traces(first=data), 'is_text', 'is_modbus') == (is_text, is_modbus)
+
+
+def test_bytes_that_have_the_check_of_modbus_by_chance_are_not_modbus() -> None:
+    heard = Traces(characters=8, first=bytes.fromhex('01 03 00 00 00 0A C5 CD'))
+    assert 'Modbus' in diagnose(heard).cause
+    assert 'Modbus' not in diagnose(replace(heard, replies=3, damaged=2)).cause
 
 
 def test_no_message_of_df1_is_modbus() -> None:

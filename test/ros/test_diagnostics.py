@@ -740,7 +740,7 @@ def test_rows_left_out_of_the_map_stay_visible(make_bench: Benches) -> None:
 
 
 def test_many_faults_of_the_map_are_not_all_repeated(make_bench: Benches) -> None:
-    bench = make_bench(*['pump,Read,N7:0,300,PLC5,'] * 21)
+    bench = make_bench(*[f'pump{number},Read,N7:0,300,PLC5,' for number in range(21)])
     level, text = bench.says('mappings')
     assert level == WARN
     assert text.startswith('WARN: no mapping reads; 21 rows left out of the map, the first at')
