@@ -198,8 +198,9 @@ class Output:
         if self._bundle and self._has_written(self._bundle, 'report'):
             _say(f'{self._options.report}: its README.txt lists the contents; look through the '
                  'bundle before you pass it on')
-        if self._timeline:
-            self._has_written(self._timeline, 'html')
+        if self._timeline and self._has_written(self._timeline, 'html'):
+            for remark in self._timeline.remarks:
+                _say(f'--curve: {remark}')
 
     def _has_written(self, picture: ReportBundle | Timeline, option: str) -> bool:
         """Write the file of an option; return True on success."""
@@ -328,7 +329,8 @@ def parse(args: Sequence[str] | None) -> argparse.Namespace:
                         help='also draw the line as a timeline with its faults, for a browser')
     parser.add_argument('--curve', metavar='ADDRESS', dest='curves', action='append', default=[],
                         help='for --html: also draw the values of an address, such as N7:0 or '
-                             'B3:0/2, in the replies of each station; may be repeated')
+                             'B3:0/2, or of several with commas, in the replies of each station; '
+                             'may be repeated')
     parser.add_argument('--report', metavar='ZIP', type=_bundle_option,
                         help='make a bundle of captures for a report: bytes, words, summary, '
                              'processors, versions')

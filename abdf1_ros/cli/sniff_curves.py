@@ -19,13 +19,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from datetime import datetime, timedelta, UTC
 
-from abdf1_ros.cli.plc.data import check_for_some_family, mapping_of
+from abdf1_ros.cli.lanes import text_of
+from abdf1_ros.cli.plc.data import check_for_some_family, listed_addresses, mapping_of
 from abdf1_ros.cli.plc.log_picture import ValuePicture
 from abdf1_ros.cli.plc.log_reader import Sample, ValuePlace
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.foreign_words import words_in_reply
 from abdf1_ros.errors import FormatError
-from abdf1_ros.pccc.describe import effect_of
+from abdf1_ros.pccc.describe import describe, effect_of
 from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.notation import Effect
@@ -35,18 +36,24 @@ from abdf1_ros.sniffer.entries import Entry, Kind
 
 # Most different commands of which is kept whether they read an address.
 _MOST_KNOWN = 10_000
+_MOST_READS = 8  # that a remark may name
 
 
 class HeardCurves:
     """
     Collect the values that good replies have, of each station that is asked for them.
 
+    Each item of ``addresses`` is an address, or several with commas. ``remarks`` names those that
+    no reply has.
+
     Raises ConfigurationError if no family has one of the addresses.
     """
 
     def __init__(self, addresses: Sequence[str]) -> None:
-        check_for_some_family(addresses, _cells(0))
-        self._addresses = addresses
+        self._addresses = [address for text in addresses for address in listed_addresses(text)]
+        check_for_some_family(self._addresses, _cells(0))
+        self._found: set[str] = set()
+        self._reads: dict[str, None] = {}  # the reads that were answered, in words
         self._picture = ValuePicture()
         self._places: set[ValuePlace] = set()
         self._rows: dict[tuple[int, str, PlcType], Mapping | None] = {}
@@ -67,6 +74,8 @@ class HeardCurves:
         elif entry.kind is Kind.REPLY and command is not None and reply is not None \
                 and not reply.sts and entry.latency is not None \
                 and effect_of(command) is Effect.READS:
+            if len(self._reads) < _MOST_READS:
+                self._reads[describe(command)] = None
             for address in self._addresses:
                 self._take(address, command, reply, when)
 
@@ -85,6 +94,7 @@ class HeardCurves:
             values = row.codec.decoder()(words)
         except FormatError:
             return
+        self._found.add(address)
         station = str(row.station)
         told: Sequence[float | str] = [values] if isinstance(values, str) else values
         for number, value in enumerate(told):
@@ -103,13 +113,20 @@ class HeardCurves:
                 self._rows[key] = None
         return self._rows[key]
 
+    @property
+    def remarks(self) -> list[str]:
+        """Return a remark for each address that no reply has."""
+        reads = '; '.join(self._reads) or 'nothing'
+        return [f'no reply has {address}; answered is: {reads}'
+                for address in self._addresses if address not in self._found]
+
     def parts(self) -> Iterator[str]:
         """Yield the parts of the page."""
         yield '<h2>Values</h2>'
         if self._picture.rows:
             yield from self._picture.drawings('h3')
-        else:
-            yield '<p class="is-odd">no reply has these values</p>'
+        for remark in self.remarks:
+            yield f'<p class="is-odd">{text_of(remark)}</p>'
 
 
 def _cells(station: int) -> dict[str, str]:

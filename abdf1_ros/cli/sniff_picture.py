@@ -284,6 +284,11 @@ class Timeline:
             lanes, start, start + recording.length, recording.clock(start) or recording.unit,
             name=recording.name(strip.number))
 
+    @property
+    def remarks(self) -> list[str]:
+        """Return what the page cannot show."""
+        return self._curves.remarks if self._curves else []
+
     def write(self, path: str, summary: Summary, kind: LineKind) -> None:
         """Write the page; raises OSError."""
         self._close()

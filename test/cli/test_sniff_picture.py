@@ -245,8 +245,12 @@ def test_values_of_addresses_are_curves_where_they_are_asked_for(
     assert {'Station 2', 'Station 3', '14:05:10'} <= {*found.texts}
     assert any(text.startswith('N7:1/1, 2026-03-01 14:05:10') for text in found.texts)
     assert '2026-03-01 14:05:14, no value for 4.0 s: no answer' in found.texts
-    assert 'no reply has these values' in drawn(
-        tmp_path, capsys, file, '--curve', 'N9:0').texts
+    assert 'N7:0: 256 to 275' in drawn(tmp_path, capsys, file, '--curve', 'N7:1/1,N7:0').texts
+    missing = 'no reply has N9:0; answered is: protected typed logical read N7:0, 2 words'
+    page = tmp_path / 'line.html'
+    told = call(main, capsys, file, '--html', str(page), '--curve', 'N7:0', '--curve', 'N9:0')
+    assert (told.status, told.err) == (0, f'sniff: --curve: {missing}\n')
+    assert missing in page.read_text('utf-8')
     for args, told in ((('--curve', 'N7:0'), '--curve is for --html'),
                        (('--html', str(tmp_path / 'x'), '--curve', 'X7:0'), 'X7:0')):
         said_now = call(main, capsys, file, *args)

@@ -177,10 +177,14 @@ def _meant(address: str) -> str:
         return f'; a port is given with --port {address}'
     if re.fullmatch('COM[0-9]+', address, re.IGNORECASE):
         return '; a port is given with --port, as in --port /dev/ttyUSB0'
-    parts = re.split('[,; ]+', address.strip(',; '))
-    if len(parts) > 1 and all(map(looks_like_address, parts)):
-        return f'; several addresses stand apart: {" ".join(parts)}'
-    return ''
+    parts = listed_addresses(address)
+    return f'; several addresses stand apart: {" ".join(parts)}' if len(parts) > 1 else ''
+
+
+def listed_addresses(text: str) -> list[str]:
+    """Return the addresses of a list with commas or blanks; any other text as it stands."""
+    parts = re.split('[,; ]+', text.strip(',; '))
+    return parts if all(map(looks_like_address, parts)) else [text]
 
 
 def length_of(address: str, kind: str | None, texts: Sequence[str]) -> int:
