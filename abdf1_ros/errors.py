@@ -24,11 +24,12 @@ class Abdf1Error(Exception):
     Anything this package raises on purpose.
 
     ``about`` is the subject of the request, such as "N7:0 of station 1"; it is empty if unknown.
-    ``done`` tells the part of the request that was carried out before.
+    ``done`` tells the part of the request that was carried out before, ``hint`` what may help.
     """
 
     about: str = ''
     done: str = ''
+    hint: str = ''
 
     def __reduce__(self) -> tuple[object, ...]:
         """Let pickle and copy keep args and attributes, whatever the constructor takes."""
@@ -39,8 +40,8 @@ class Abdf1Error(Exception):
         return super().__str__()
 
     def __str__(self) -> str:
-        """Return the subject and what is wrong with it."""
-        return f'{self.about and self.about + ": "}{self.words()}{self.done}'
+        """Return the subject, what is wrong with it, and what may help."""
+        return f'{self.about and self.about + ": "}{self.words()}{self.done}{self.hint}'
 
 
 def _made_again(kind: type[Abdf1Error], args: tuple[object, ...]) -> Abdf1Error:
@@ -140,9 +141,8 @@ class CommandExpired(LinkError):
         return 'too old to be sent once more' if self.sent else 'too old to be sent'
 
 
-INTERNAL_ERROR = 'internal error, see the log'  # the reason if a bug ends the use of the port
-
-
+# Reasons of an end of the port: a bug, and our own close.
+INTERNAL_ERROR = 'internal error, see the log'
 CLOSED = 'closed by this program'
 
 

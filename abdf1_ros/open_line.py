@@ -39,13 +39,7 @@ from abdf1_ros.df1.packet import is_local_status
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.requests import Requests
-from abdf1_ros.errors import (
-    Abdf1Error,
-    FormatError,
-    PortLost,
-    RemoteError,
-    StationInactive,
-)
+from abdf1_ros.errors import Abdf1Error, FormatError, PortLost, RemoteError, StationInactive
 from abdf1_ros.messages import Event, Severity
 from abdf1_ros.pccc.dialect import Steps
 from abdf1_ros.pccc.file_types import PlcType
@@ -381,7 +375,7 @@ class BlockingClient(_Closes):
             try:
                 yield
             except StationInactive as error:
-                error.done = self._line.unheard
+                error.hint = self._line.unheard
                 raise
 
     if not TYPE_CHECKING:  # with it mypy would let all names pass

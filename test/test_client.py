@@ -40,6 +40,7 @@ from abdf1_ros.cli.sniff import main as sniff
 from abdf1_ros.client import Client
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import Frame, Symbol
 from abdf1_ros.df1.machine import LineTiming
 from abdf1_ros.df1.master import MASTER
 from abdf1_ros.df1.peer import PEER
@@ -48,6 +49,8 @@ from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import TaskSource
 from abdf1_ros.errors import FormatError, LinkError, PortLost, RemoteError, StationInactive
 from abdf1_ros.open_line import kind_of, LOG, OpenLine, Pending
+from abdf1_ros.pccc.families import parse_address
+from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity, Mode
 from abdf1_ros.pccc.steps import identify
 from abdf1_ros.ports.link_thread import LinkThread
@@ -244,6 +247,24 @@ def test_settings_are_named_while_nothing_fits_them(port: str) -> None:
         right.read('N7:0')
         with pytest.raises(StationInactive, match=r'\(9\) Inactive$'):
             right.read('N7:0', station=9)
+
+
+def test_packets_that_were_written_before_a_silence_are_told(tmp_path: Path) -> None:
+    plc = simulated_plc(1, 'SLC', time.monotonic, *FILES)
+    handle = plc.handle
+
+    def handle_first(symbol: Symbol) -> bytes:
+        if isinstance(symbol, Frame):  # of a later packet, if the first has been executed
+            plc.faults.silent = any(plc.table.read(parse_address('N7:0', PlcType.SLC), 1))
+        return handle(symbol)
+
+    plc.handle = handle_first  # type: ignore[method-assign]
+    with plc_line(tmp_path / 'line', plc) as name, \
+            Client(name, duplex='half', baud=115200, plc_type='SLC', timeout=0.05, retries=0,
+                   cmd_timeout=0.5) as here, \
+            pytest.raises(LinkError, match=r' \(after 1 of 2 packets were written\)$') as error:
+        here.write('N7:0', 200 * [5])
+    assert error.value.sent
 
 
 def test_retries_trace_and_log_are_arguments(port: str, tmp_path: Path,
