@@ -88,8 +88,7 @@ def check_floats(command: Packet) -> None:
         raise FormatError('only a part of a float')
     for index, (value,) in enumerate(struct.iter_unpack('<f', data)):
         if not math.isfinite(value):
-            raise FormatError(f'value {value} at index {index} is not a valid float32, '
-                              f'{ValueType.FLOAT32.form}')
+            raise ValueType.FLOAT32.refusal(value, index)
 
 
 def _floats_of(command: Packet) -> bytes:

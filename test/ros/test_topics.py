@@ -291,6 +291,16 @@ def test_spare_that_waits_tells_nothing(bench: Bench) -> None:
     assert bench.status.judge(12)[0] == OK
 
 
+def demand_told_once(bench: Bench, ends: dict[str, list[str]], topic: str, told: str) -> None:
+    """Demand a line of the log and the status while a topic is in ``ends``, and then no more."""
+    assert [text for _, text in bench.told(0, 30)] == [f'{topic} {told}']
+    assert bench.status.judge(30) == (WARN, f'used, but not there: {topic}')
+    assert bench.status.values(30) == {topic: told}
+    del ends[topic]
+    bench.told(30, 40)
+    assert bench.status.judge(40)[0] == OK
+
+
 @for_all(('topic', 'reason'), [
     ('/press/write/door', 'door is only read'),
     ('/press/write/speeed', 'no row writes this topic'),
@@ -301,13 +311,8 @@ def test_spare_that_waits_tells_nothing(bench: Bench) -> None:
 def test_message_that_nobody_takes_is_told_once(topic: str, reason: str) -> None:
     bench = Bench(names(write_recipe='/cell/recipe'))
     bench.domain.publishers[topic] = ['/hmi']
-    told = f'is published by /hmi, but not written: {reason}'
-    assert [text for _, text in bench.told(0, 30)] == [f'{topic} {told}']
-    assert bench.status.judge(30) == (WARN, f'used, but not there: {topic}')
-    assert bench.status.values(30) == {topic: told}
-    del bench.domain.publishers[topic]
-    bench.told(30, 40)
-    assert bench.status.judge(40)[0] == OK
+    demand_told_once(bench, bench.domain.publishers, topic,
+                     f'is published by /hmi, but not written: {reason}')
 
 
 def test_only_some_of_very_many_topics_beside_ours_are_looked_at(bench: Bench) -> None:
@@ -334,13 +339,8 @@ def test_message_that_a_node_may_take_is_not_told(topic: str, publishers: list[s
 def test_subscriber_that_no_node_can_serve_is_told_once(topic: str, reason: str) -> None:
     bench = Bench(names(read_lamps='/cell/lamps'))
     bench.domain.readers = {topic: ['/cell/hmi', '/robot'], DOOR: ['/robot']}
-    told = f'is subscribed to by /cell/hmi, /robot, but not published: {reason}'
-    assert [text for _, text in bench.told(0, 30)] == [f'{topic} {told}']
-    assert bench.status.judge(30) == (WARN, f'used, but not there: {topic}')
-    assert bench.status.values(30) == {topic: told}
-    del bench.domain.readers[topic]
-    bench.told(30, 40)
-    assert bench.status.judge(40)[0] == OK
+    demand_told_once(bench, bench.domain.readers, topic,
+                     f'is subscribed to by /cell/hmi, /robot, but not published: {reason}')
 
 
 @for_all(('topic', 'publishers'), [

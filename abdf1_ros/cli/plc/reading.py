@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections import Counter, deque
 from collections.abc import Callable, Sequence
 from datetime import datetime
@@ -102,7 +103,11 @@ class NewReads:
         self._taken = []
 
 
-class RepeatedReads:
+def _pass_over(reads: RepeatedReads, *args: object) -> None:
+    """Do nothing: the point has the reason, and no other event can happen here."""
+
+
+class RepeatedReads(ABC):
     """
     Read ``mappings`` every ``period`` seconds; ``show`` of a subclass gets the results.
 
@@ -182,12 +187,13 @@ class RepeatedReads:
         return next((station.number for station in asked
                      if not station.active or station.unanswered), None)
 
+    @abstractmethod
     def begin(self) -> None:
         """Do what comes before the first result."""
 
+    @abstractmethod
     def show(self, news: Sequence[WatchedRead], lost: int) -> None:
         """Show results; ``lost`` results before them were dropped."""
-        raise NotImplementedError
 
     def read(self, mapping: Mapping, values: Values) -> None:
         """Record the values of a read; called in the link thread."""
@@ -195,10 +201,7 @@ class RepeatedReads:
         self._news.add(mapping, values)
         self._reads[mapping] += 1
 
-    def unreadable(self, *args: object) -> None:
-        """Do nothing: the point has the reason, and no other event can happen here."""
-
-    published_again = written = foreign_value = happened = unreadable
+    unreadable = published_again = written = foreign_value = happened = _pass_over
 
     def station_changed(self, station: Station) -> None:
         """Wake the thread that shows the news."""

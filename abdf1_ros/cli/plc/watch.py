@@ -67,6 +67,9 @@ class LiveValues(RepeatedReads):
         super().__init__(network, mappings, period, record,
                          processor_period=_MODE_PERIOD if self._is_live else 0.0)
 
+    def begin(self) -> None:
+        """Print nothing before the first values."""
+
     def show(self, news: Sequence[WatchedRead], lost: int) -> None:
         """Draw the table again, or print what has changed."""
         if self._is_live:
