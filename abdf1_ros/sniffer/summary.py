@@ -122,7 +122,8 @@ class Summary:
         """
         Return True if only one side of the line was recorded.
 
-        What it acknowledges or answers proves the other side, which is not in the recording.
+        A recorded ACK or reply proves that something was said before it. If that is not in the
+        recording, the far side was not recorded.
         """
         kinds = self.all.kinds
         if not kinds[Kind.COMMAND] + kinds[Kind.POLL]:

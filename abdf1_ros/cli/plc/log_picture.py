@@ -91,7 +91,8 @@ class _Course:
       empty if there were several.
     - ``since``: the time of the last row with a value, or of the first without.
     - ``reason``: why there is no value since ``noted``, empty if there is one.
-    - ``latest``: the value at the latest time, ``latest_at``; ``before``: that of the row before.
+    - ``latest``: the value at the latest time, ``latest_at``; ``before``: the value of the last
+      row.
     - ``begun``: the begin of this run of rows; ``runs``: begin and end of the runs before.
     """
 

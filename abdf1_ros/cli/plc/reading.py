@@ -143,7 +143,7 @@ class RepeatedReads(ABC):
         self._link = LinkThread(self._driver.machine, port, while_sending=self._note_failures,
                                 longest_wait=_LONGEST_WAIT)
         self._news = NewReads()
-        # reads and failures, each counted when its result is on the way to the other thread
+        # Good and failed reads; each is counted after its result was given to NewReads.
         self._reads: Counter[Mapping] = Counter()
         self._failures: dict[Mapping, int] = {}
         self._noted: dict[Mapping, str] = {}

@@ -61,7 +61,8 @@ _UNKNOWN = '_NODE_NAME_UNKNOWN_'
 UNKNOWN_NODE = 'a program without a node name'
 
 
-# Between the name of a bridge and that of a row: in its topics, and in its services.
+# The parts of full names between the bridge's name and the row's name: two of topics, two of
+# services.
 ROW_PARTS = 'write', 'read', 'set', 'read_now'
 
 

@@ -139,7 +139,7 @@ class _Side(NamedTuple):
 
     - ``part``: of the names, in ``ROW_PARTS``
     - ``users``: returns the nodes that use a name
-    - ``others``: returns the number of partners that these nodes have; ours has none
+    - ``partners``: returns how many nodes take, publish or offer the name
     - ``use``: how the nodes use it, and what is missing
     - ``unknown``: what is wrong with a row that there is not
     - ``names``: the full names by the topic of the row; none for services
@@ -149,7 +149,7 @@ class _Side(NamedTuple):
 
     part: str
     users: Callable[[str], list[str]]
-    others: Callable[[str], int]
+    partners: Callable[[str], int]
     use: tuple[str, str]
     unknown: str
     names: Mapping[str, str] = {}
@@ -224,5 +224,5 @@ class StrayWatch:
                 if name in ours or not (is_below or row in side.names):
                     continue
                 # Below our name only we take messages: another subscriber may record them.
-                if (is_below and side.part == 'write') or not side.others(name):
+                if (is_below and side.part == 'write') or not side.partners(name):
                     yield name, side.reason(row)
